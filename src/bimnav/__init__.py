@@ -1,0 +1,100 @@
+"""From IFC building models to robot tasks: targets, obstacles, routes, simulation and figures.
+
+Names load their module when first used; importing bimnav alone is cheap.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bimnav._start import Start as Start, find_start as find_start
+    from bimnav.building import (
+        Building as Building,
+        Connector as Connector,
+        Detection as Detection,
+        Door as Door,
+        Element as Element,
+        Issue as Issue,
+        Ledger as Ledger,
+        Mesh as Mesh,
+        Opening as Opening,
+        Shape as Shape,
+        Space as Space,
+        Storey as Storey,
+    )
+    from bimnav.detections import read_targets as read_targets
+    from bimnav.environment import (
+        IndoorEnvironment as IndoorEnvironment,
+        Obstacle as Obstacle,
+        Region as Region,
+        Target as Target,
+        Zone as Zone,
+        make_environment as make_environment,
+    )
+    from bimnav.errors import BimnavError as BimnavError
+    from bimnav.graph import (
+        Conflict as Conflict,
+        NavGraph as NavGraph,
+        NodeKind as NodeKind,
+        Stop as Stop,
+        Unreached as Unreached,
+        build_graph as build_graph,
+    )
+    from bimnav.grid import Cell as Cell, GridFrame as GridFrame, rasterize as rasterize
+    from bimnav.ifc import read_ifc as read_ifc
+    from bimnav.inspection import inspect as inspect
+    from bimnav.mission import Mission as Mission, run as run
+    from bimnav.plan import (
+        Path as Path,
+        Tour as Tour,
+        distance_field as distance_field,
+        distance_matrix as distance_matrix,
+        find_path as find_path,
+        order_stops as order_stops,
+        plan_tour as plan_tour,
+    )
+    from bimnav.plot import plot_environment as plot_environment, plot_graph as plot_graph, plot_tour as plot_tour
+    from bimnav.robot import Robot as Robot
+    from bimnav.samples import list_samples as list_samples, sample as sample
+    from bimnav.sim import SimResult as SimResult, simulate as simulate
+    from bimnav.tasks import Rule as Rule, Task as Task, list_tasks as list_tasks, load_task as load_task
+    from bimnav.verify import Check as Check, check_path as check_path, check_plan as check_plan
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "bimnav.building": ("Building Connector Detection Door Element Issue Ledger Mesh Opening Shape Space Storey"),
+    "bimnav.detections": "read_targets",
+    "bimnav.environment": "IndoorEnvironment Obstacle Region Target Zone make_environment",
+    "bimnav.errors": "BimnavError",
+    "bimnav.graph": "Conflict NavGraph NodeKind Stop Unreached build_graph",
+    "bimnav.grid": "Cell GridFrame rasterize",
+    "bimnav.ifc": "read_ifc",
+    "bimnav.inspection": "inspect",
+    "bimnav._start": "Start find_start",
+    "bimnav.mission": "Mission run",
+    "bimnav.plan": "Path Tour distance_field distance_matrix find_path order_stops plan_tour",
+    "bimnav.plot": "plot_environment plot_graph plot_tour",
+    "bimnav.robot": "Robot",
+    "bimnav.samples": "list_samples sample",
+    "bimnav.sim": "SimResult simulate",
+    "bimnav.tasks": "Rule Task list_tasks load_task",
+    "bimnav.verify": "Check check_path check_plan",
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+
+__all__ = ["__version__", *_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'bimnav' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -1,0 +1,132 @@
+"""Where a robot begins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from bimnav.building import Element, Space
+from bimnav.environment import IndoorEnvironment, Place
+from bimnav.errors import NothingWalkableError, OutsideMapError, StartBlockedError
+from bimnav.graph import NavGraph
+from bimnav.grid import Cell
+
+__all__ = ["Start", "find_start"]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where a job begins: cell, exact point in metres, and why there."""
+
+    cell: Cell
+    point: tuple[float, float, float]
+    source: str
+
+
+def find_start(graph: NavGraph, place: Place | None = None) -> Start:
+    """Choose where a robot begins.
+
+    Parameters
+    ----------
+    graph
+        Made from an environment.
+    place
+        `(x, y)` or `(x, y, storey)` in metres; None for the charging dock, else the middle of the
+        largest region of the lowest walkable storey.
+
+    Raises
+    ------
+    OutsideMapError
+        If the place lies on no floor.
+    StartBlockedError
+        If the robot would touch an obstacle there; the message names it and a free point near by.
+    """
+    environment = _environment_of(graph)
+    if not graph.free.any():
+        raise NothingWalkableError(
+            f"no cell of {environment.building.name!r} is free for robot {environment.robot.name!r}.",
+            "Use smaller cells or a smaller robot.",
+        )
+    if place is not None:
+        return _start_at(graph, place)
+    for dock, _ in _docks(environment):
+        bounds = dock.bounds
+        if bounds is None:
+            continue
+        storey = graph.frame.storey_at(float(bounds[0, 2]))
+        x, y = (bounds[0, :2] + bounds[1, :2]) / 2
+        near = _nearest_free(graph, storey, float(x), float(y))
+        if near is not None and math.dist(near[1][:2], (x, y)) <= 3:
+            return Start(*near, f"charging dock {dock.name} ({dock.global_id})")
+    storeys = (graph.frame.ground, *range(graph.frame.shape[0]))
+    storey = next(s for s in storeys if graph.free[s].any())
+    regions = [r for r in environment.regions if r.storey == storey]
+    largest = max(regions, key=lambda region: region.polygon.area)
+    middle = largest.polygon.centroid
+    found = _nearest_free(graph, storey, middle.x, middle.y)
+    assert found is not None  # noqa: S101 - the storey was chosen because it has free cells
+    return Start(*found, f"near the middle of {largest.name}")
+
+
+def _environment_of(graph: NavGraph) -> IndoorEnvironment:
+    if graph.environment is None:
+        raise NothingWalkableError("the graph was made from a mask; it has no building to start in.")
+    return graph.environment
+
+
+def _docks(environment: IndoorEnvironment) -> Iterable[tuple[Element | Space, str]]:
+    from bimnav.tasks import match
+
+    for rule in environment.task.docks:
+        yield from match(rule, environment.building)
+
+
+def _nearest_free(graph: NavGraph, storey: int, x: float, y: float) -> tuple[Cell, tuple[float, float, float]] | None:
+    """Return the free cell nearest to a point, and the point itself if the robot can stand on it."""
+    rows, cols = np.nonzero(graph.free[storey])
+    if not len(rows):
+        return None
+    centers = graph.frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
+    distance = np.round(np.hypot(centers[:, 0] - x, centers[:, 1] - y), 9)
+    k = int(np.lexsort((cols, rows, distance))[0])
+    cell = Cell(storey, int(rows[k]), int(cols[k]))
+    x0, y0, x1, y1 = graph.frame.box_of(cell)
+    if x0 <= x < x1 and y0 <= y < y1 and _environment_of(graph).is_clear(storey, (x, y)):
+        return cell, (x, y, graph.frame.elevations[storey])
+    return cell, graph.frame.center_of(cell)
+
+
+def _start_at(graph: NavGraph, place: Place) -> Start:
+    environment = _environment_of(graph)
+    x, y = float(place[0]), float(place[1])
+    named = place[2] if len(place) > 2 else None
+    point = shapely.Point(x, y)
+    storey = environment.storeys_at(place)[0]
+    on_floor = environment.floor(storey).intersects(point)
+    blocked = any(body.intersects(point) for _, body in environment.bodies_on(storey))
+    where = f"start ({x:g}, {y:g})" + (f" on {named}" if named is not None else "")
+    if not on_floor and not blocked:
+        x_min, y_min, x_max, y_max = graph.frame.bounds
+        raise OutsideMapError(
+            f"{where} lies on no floor.",
+            f"The map reaches from x {x_min:.2f} to {x_max:.2f} m and y {y_min:.2f} to {y_max:.2f} m; "
+            "give a point inside a room.",
+            {"x": x, "y": y, "storey": named},
+        )
+    cell = graph.frame.cell_at(x, y, storey=storey)
+    near = _nearest_free(graph, storey, x, y)
+    if near is not None and environment.is_clear(storey, (x, y), near[1]):
+        return Start(near[0], (x, y, environment.levels[storey]), "given")
+    box = shapely.box(*graph.frame.box_of(cell))
+    touched = [o for o, body in environment.bodies_on(storey) if body.intersects(box)]
+    names = ", ".join(f"{o.name or o.ifc_class} ({o.global_id})" for o in touched) or "the edge of the floor"
+    hint = f"The nearest free point is ({near[1][0]:.3f}, {near[1][1]:.3f})." if near else "Use smaller cells."
+    raise StartBlockedError(
+        f"{where} is blocked: its cell touches {names}.",
+        hint,
+        {"x": x, "y": y, "obstacles": [o.global_id for o in touched]},
+    )

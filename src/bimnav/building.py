@@ -1,0 +1,522 @@
+"""The building as values: storeys, spaces, elements, doors, in metres and world coordinates.
+
+Everything after this module works on a `Building` written by hand as well as on one read from IFC.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bimnav.errors import GeometryError, ModelError, ValueRangeError
+
+__all__ = [
+    "Building",
+    "Connector",
+    "Detection",
+    "Door",
+    "Element",
+    "Issue",
+    "Ledger",
+    "Mesh",
+    "Opening",
+    "Shape",
+    "Space",
+    "Storey",
+]
+
+_FARTHEST = 1e8  # metres from the origin; beyond it float64 no longer holds a tenth of a micrometre
+
+
+def _frozen(values: ArrayLike, dtype: type[np.generic], columns: int, what: str) -> NDArray[Any]:
+    array = np.array(values, dtype=dtype)  # a private copy
+    if array.size == 0:
+        array = array.reshape(0, columns)
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise GeometryError(f"{what} have shape {array.shape}.", f"Give an array of shape (n, {columns}).")
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Triangles in coordinates of their own; shared by every shape that repeats them.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64, metres
+    faces : (m, 3) int32, indexes into `vertices`; outward faces run counter-clockwise
+    quality
+        How the mesh came about: `exact` (closed as given), `repaired` (closed after welding),
+        `surface` (open: treated as a set of sheets) or `hull`.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    quality: str = "exact"
+
+    def __post_init__(self) -> None:
+        vertices = _frozen(self.vertices, np.float64, 3, "vertices")
+        faces = _frozen(self.faces, np.int32, 3, "faces")
+        if not np.isfinite(vertices).all() or (vertices.size and float(np.abs(vertices).max()) > _FARTHEST):
+            raise GeometryError("a mesh has vertices that are not finite or are out of range.")
+        if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(vertices)):
+            raise GeometryError(f"a mesh of {len(vertices)} vertices has faces that refer to others.")
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """A mesh put in its place.
+
+    Parameters
+    ----------
+    mesh
+        The triangles.
+    placement : (4, 4) float64
+        From mesh to world coordinates.
+    """
+
+    mesh: Mesh
+    placement: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    bounds: NDArray[np.float64] = field(init=False)  # (2, 3) lowest and highest world coordinates
+
+    def __post_init__(self) -> None:
+        placement = np.array(self.placement, dtype=np.float64)
+        if placement.shape != (4, 4) or not np.isfinite(placement).all():
+            raise GeometryError("a placement is not a finite (4, 4) matrix.")
+        placement.flags.writeable = False
+        object.__setattr__(self, "placement", placement)
+        points = self.world_vertices()
+        bounds = np.array([points.min(axis=0), points.max(axis=0)]) if len(points) else np.full((2, 3), np.nan)
+        bounds.flags.writeable = False
+        object.__setattr__(self, "bounds", bounds)
+
+    def world_vertices(self) -> NDArray[np.float64]:
+        """Return the vertices in world coordinates, (n, 3) metres."""
+        points: NDArray[np.float64] = self.mesh.vertices @ self.placement[:3, :3].T + self.placement[:3, 3]
+        return points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Element:
+    """A product of the model: a wall, a chair, a valve.
+
+    Parameters
+    ----------
+    global_id
+        Its IFC GlobalId; its identity from the file to the last log entry.
+    ifc_class
+        Such as `IfcFurniture`.
+    name, type_name, object_type, predefined_type, tag
+        As the file says; empty where it says nothing.
+    storey, space, parent
+        GlobalIds of what the file says contains it, or None. Containers lie: what an element
+        blocks is decided by its geometry.
+    shapes
+        Its solids, openings already subtracted. Empty if it has no geometry.
+    """
+
+    global_id: str
+    ifc_class: str
+    name: str = ""
+    type_name: str = ""
+    object_type: str = ""
+    predefined_type: str = ""
+    tag: str = ""
+    storey: str | None = None
+    space: str | None = None
+    parent: str | None = None
+    shapes: tuple[Shape, ...] = field(default=(), repr=False)
+
+    @property
+    def family(self) -> str:
+        """The part of the name before the first colon: the family in models from Revit."""
+        return self.name.split(":", 1)[0].strip()
+
+    @property
+    def bounds(self) -> NDArray[np.float64] | None:
+        """Lowest and highest world coordinates, (2, 3) metres; None without geometry."""
+        return _bounds_of(self.shapes)
+
+
+def _bounds_of(shapes: Sequence[Shape]) -> NDArray[np.float64] | None:
+    boxes = [shape.bounds for shape in shapes if not np.isnan(shape.bounds).any()]
+    if not boxes:
+        return None
+    return np.array([np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Storey:
+    """A storey; `elevation` is the world height of its placement in metres."""
+
+    global_id: str
+    name: str
+    elevation: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Space:
+    """A room; `storey` is the GlobalId of its storey, or None.
+
+    It answers to the same descriptive names as an element, so that rules can pick rooms too.
+    """
+
+    global_id: str
+    name: str
+    long_name: str = ""
+    storey: str | None = None
+    shapes: tuple[Shape, ...] = field(default=(), repr=False)
+    type_name: str = ""
+    object_type: str = ""
+    predefined_type: str = ""
+    tag: str = ""
+    ifc_class: str = "IfcSpace"
+
+    @property
+    def family(self) -> str:
+        """The name by which rules know a room: its long name, if it has one."""
+        return self.long_name or self.name
+
+    @property
+    def label(self) -> str:
+        """Number and name, whichever the file gives."""
+        if self.long_name and self.long_name not in self.name:
+            return f"{self.name} {self.long_name}".strip()
+        return self.name or self.global_id
+
+    @property
+    def bounds(self) -> NDArray[np.float64] | None:
+        """Lowest and highest world coordinates, (2, 3) metres; None without geometry."""
+        return _bounds_of(self.shapes)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Opening:
+    """A void in a wall or slab.
+
+    Parameters
+    ----------
+    host
+        GlobalId of the element it cuts.
+    fillings
+        GlobalIds of the doors or windows that fill it; empty for a passage.
+    """
+
+    global_id: str
+    host: str | None = None
+    fillings: tuple[str, ...] = ()
+    shapes: tuple[Shape, ...] = field(default=(), repr=False)
+
+    @property
+    def bounds(self) -> NDArray[np.float64] | None:
+        """Lowest and highest world coordinates, (2, 3) metres; None without geometry."""
+        return _bounds_of(self.shapes)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Door:
+    """A door: passable because it is one, whatever its leaf looks like.
+
+    Parameters
+    ----------
+    element
+        The door's element.
+    opening
+        The void it fills; None for a door in a curtain wall.
+    width, height
+        Overall size in metres as the file says; None where it says nothing.
+    """
+
+    element: Element
+    opening: Opening | None = None
+    width: float | None = None
+    height: float | None = None
+
+    @property
+    def global_id(self) -> str:
+        """GlobalId of the door."""
+        return self.element.global_id
+
+    @property
+    def name(self) -> str:
+        """Name of the door."""
+        return self.element.name
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Connector:
+    """A stair, ramp or lift.
+
+    Parameters
+    ----------
+    kind
+        `stair`, `ramp` or `lift`.
+    parts
+        GlobalIds of the elements that make it up.
+    low, high
+        World height of its lower and upper end in metres.
+    """
+
+    global_id: str
+    name: str
+    kind: Literal["stair", "ramp", "lift"]
+    parts: tuple[str, ...]
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Issue:
+    """Something that was lost, or looks wrong, in a model.
+
+    Parameters
+    ----------
+    code
+        A stable word to search for, such as `lost-shape`.
+    message
+        What was found, with the value.
+    global_ids
+        The elements concerned.
+    severity
+        `error`: something was lost. `warning`: the answer may be worse than asked. `info`: worth knowing.
+    hint
+        How to repair it.
+    """
+
+    code: str
+    message: str
+    global_ids: tuple[str, ...] = ()
+    severity: Literal["error", "warning", "info"] = "warning"
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Ledger:
+    """Where every product of the file went; nothing is lost in silence.
+
+    Parameters
+    ----------
+    asked
+        GlobalIds of all products that have a representation.
+    left_out
+        GlobalId to the named rule that left it out.
+    lost
+        GlobalId to the reason why its geometry could not be had.
+    """
+
+    asked: tuple[str, ...] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    lost: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def read(self) -> tuple[str, ...]:
+        """GlobalIds of the products whose geometry was read."""
+        return tuple(g for g in self.asked if g not in self.left_out and g not in self.lost)
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """A target placed by the user, a camera or a digital twin.
+
+    Parameters
+    ----------
+    name
+        As given.
+    x, y
+        World point in metres.
+    storey
+        Name, GlobalId or index of a storey; None if `z` tells, or the job does.
+    z
+        World height in metres, or None.
+    size
+        Width and depth in metres, or None if unknown.
+    ifc_class
+        What was seen, as an IFC class.
+    """
+
+    name: str
+    x: float
+    y: float
+    storey: str | int | None = None
+    z: float | None = None
+    size: tuple[float, float] | None = None
+    ifc_class: str = "IfcBuildingElementProxy"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "x", float(self.x))
+        object.__setattr__(self, "y", float(self.y))
+        numbers = {"x": self.x, "y": self.y}
+        if self.z is not None:
+            numbers["z"] = self.z
+        for what, value in numbers.items():
+            if not math.isfinite(value) or abs(value) > _FARTHEST:
+                raise ValueRangeError(
+                    f"target {self.name!r}: {what} is {value}.",
+                    "Give world coordinates of the model in metres.",
+                    {"name": self.name, what: value},
+                )
+        if self.size is not None and not all(math.isfinite(s) and 0 <= s <= 1e3 for s in self.size):
+            raise ValueRangeError(f"target {self.name!r}: size is {self.size}.", "Give metres from 0 to 1000.")
+
+    @property
+    def global_id(self) -> str:
+        """A GlobalId derived from name and position: the same target has the same id in every run."""
+        text = f"{self.name}\0{self.x!r}\0{self.y!r}\0{self.storey!r}\0{self.z!r}"
+        return _compressed(hashlib.sha256(text.encode()).digest()[:16])
+
+
+_GLOBAL_ID_DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
+
+
+def _compressed(sixteen_bytes: bytes) -> str:
+    """Write 128 bits as the 22 characters of an IFC GlobalId."""
+    number = int.from_bytes(sixteen_bytes, "big")
+    digits = []
+    for _ in range(22):
+        number, digit = divmod(number, 64)
+        digits.append(_GLOBAL_ID_DIGITS[digit])
+    return "".join(reversed(digits))
+
+
+@dataclass(frozen=True, eq=False)
+class Building:
+    """A building: what one or several models say, as values in SI units.
+
+    Parameters
+    ----------
+    name
+        Name of the project, or of the file.
+    storeys
+        From the lowest to the highest.
+    spaces, elements, doors, openings, connectors
+        What the model holds; `elements` are all products with or without geometry but openings and spaces.
+    issues
+        What was lost or looks wrong.
+    ledger
+        Where every product went.
+    schema, unit
+        As the file states them, such as `IFC4` and `foot`; empty for a building written by hand.
+    detections
+        Targets placed by the user.
+    sources
+        Paths of the files it was read from.
+    selector
+        Answers `select`: a query to GlobalIds. A building written by hand has a small one of its own.
+    property_reader
+        Answers `properties`: a GlobalId to property sets.
+    """
+
+    name: str
+    storeys: tuple[Storey, ...]
+    spaces: tuple[Space, ...] = ()
+    elements: tuple[Element, ...] = ()
+    doors: tuple[Door, ...] = ()
+    openings: tuple[Opening, ...] = ()
+    connectors: tuple[Connector, ...] = ()
+    issues: tuple[Issue, ...] = ()
+    ledger: Ledger = field(default_factory=Ledger)
+    schema: str = ""
+    unit: str = ""
+    detections: tuple[Detection, ...] = ()
+    sources: tuple[str, ...] = ()
+    selector: Callable[[str], Iterable[str]] | None = None
+    property_reader: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.storeys:
+            raise ModelError(f"building {self.name!r} has no storey.", "Give at least one Storey.")
+        heights = [storey.elevation for storey in self.storeys]
+        if heights != sorted(heights):
+            raise ModelError(f"the storeys of {self.name!r} are not ordered by elevation.", "Sort them.")
+        object.__setattr__(self, "ledger", self.ledger if self.ledger.asked else self._own_ledger())
+
+    def _own_ledger(self) -> Ledger:
+        return Ledger(asked=tuple(e.global_id for e in self.elements if e.shapes))
+
+    def __repr__(self) -> str:
+        return (
+            f"Building({self.name!r}, {len(self.storeys)} storeys, {len(self.spaces)} spaces, "
+            f"{len(self.doors)} doors, {len(self.elements)} elements, {len(self.issues)} issues)"
+        )
+
+    @cached_property
+    def _by_id(self) -> Mapping[str, Element]:
+        return MappingProxyType({element.global_id: element for element in self.elements})
+
+    def __getitem__(self, global_id: str) -> Element:
+        try:
+            return self._by_id[global_id]
+        except KeyError:
+            raise ModelError(
+                f"no element of {self.name!r} has the GlobalId {global_id!r}.",
+                "building.elements lists them all.",
+                {"global_id": global_id},
+            ) from None
+
+    def __contains__(self, global_id: object) -> bool:
+        return global_id in self._by_id
+
+    def __iter__(self) -> Iterator[Element]:
+        return iter(self.elements)
+
+    def select(self, query: str) -> tuple[Element | Space, ...]:
+        """Return what a query in IfcOpenShell's selector language picks, in model order."""
+        chosen = set((self.selector or self._select_by_hand)(query))
+        products: tuple[Element | Space, ...] = (*self.elements, *self.spaces)
+        return tuple(product for product in products if product.global_id in chosen)
+
+    def _select_by_hand(self, query: str) -> Iterable[str]:
+        from bimnav._select import select_by_hand
+
+        return select_by_hand((*self.elements, *self.spaces), query)
+
+    def properties(self, global_id: str) -> Mapping[str, Mapping[str, Any]]:
+        """Return the property sets of a product, `{set: {property: value}}`, as the file writes them."""
+        return {} if self.property_reader is None else self.property_reader(global_id)
+
+    def storey_index(self, storey: str | int) -> int:
+        """Return the index of a storey given by name, GlobalId or index.
+
+        Raises
+        ------
+        ModelError
+            If there is no such storey; the message lists the names.
+        """
+        for index, known in enumerate(self.storeys):
+            if storey in (known.name, known.global_id):
+                return index
+        if str(storey).isdecimal() and int(storey) < len(self.storeys):
+            return int(storey)
+        names = ", ".join(repr(known.name) for known in self.storeys)
+        raise ModelError(f"{self.name!r} has no storey {storey!r}.", f"It has {names}.", {"storey": storey})
+
+    def with_targets(self, targets: Iterable[Detection | Mapping[str, Any] | Sequence[Any]]) -> Self:
+        """Return the building with targets added: detections, or anything `Detection` takes.
+
+        Examples
+        --------
+        >>> flat = Building("flat", (Storey("s", "Ground", 0.0),))
+        >>> flat.with_targets([("spill", 1.0, 2.0), {"name": "peel", "x": 3, "y": 4}]).detections[1].x
+        3.0
+        """
+        added = []
+        for target in targets:
+            if isinstance(target, Mapping):
+                target = Detection(**target)
+            elif not isinstance(target, Detection):
+                target = Detection(*target)
+            if target.storey is not None:
+                self.storey_index(target.storey)
+            added.append(target)
+        return replace(self, detections=self.detections + tuple(added))

@@ -1,0 +1,413 @@
+"""The environment of one building for one task and one robot, in continuous space."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import shapely
+
+from bimnav._floors import NEAR, FloorSource, find_floors, outline
+from bimnav.building import Building, Detection, Element, Issue, Space, Storey
+from bimnav.errors import ValueRangeError
+from bimnav.footprint import Footprint, footprints_of, merge_footprints
+from bimnav.robot import Robot
+
+Place: TypeAlias = Sequence[Any]
+"""`(x, y)` or `(x, y, storey)`: metres, and the name, GlobalId or index of a storey."""
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from bimnav.tasks import Rule, Task
+
+__all__ = ["IndoorEnvironment", "Obstacle", "Place", "Region", "Target", "Zone", "make_environment"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """A piece of walkable floor.
+
+    Parameters
+    ----------
+    global_id
+        Of the space, slab, door or opening it comes from; of the storey for a hull.
+    storey
+        Index of the storey.
+    polygon
+        Plan view in world coordinates, metres.
+    source
+        What says that one can walk here.
+    """
+
+    global_id: str
+    name: str
+    storey: int
+    polygon: BaseGeometry
+    source: FloorSource
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Obstacle:
+    """What an element takes from the floor of one storey, in the height band of the robot.
+
+    Parameters
+    ----------
+    storey
+        Index of the storey; an element that reaches into two bands is two obstacles.
+    footprint
+        Plan view in world coordinates, metres, not buffered.
+    low, high
+        World heights of the part that lies in the band, metres.
+    quality
+        `exact`, `repaired`, `surface` or `hull`: how well the footprint is known.
+    rule
+        Why it is an obstacle.
+    """
+
+    global_id: str
+    name: str
+    ifc_class: str
+    storey: int
+    footprint: BaseGeometry
+    low: float
+    high: float
+    quality: str
+    rule: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """What a robot should go to.
+
+    Parameters
+    ----------
+    storey
+        Index of the storey.
+    destination
+        The exact world point, metres; z is the floor it is reached from.
+    footprint
+        Plan view of the element, or None for a bare point.
+    source
+        `model`, or `user` for a detection.
+    rule
+        Why it is a target.
+    """
+
+    global_id: str
+    name: str
+    storey: int
+    destination: tuple[float, float, float]
+    footprint: BaseGeometry | None
+    source: Literal["model", "user"]
+    rule: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Zone:
+    """Floor that costs more to cross.
+
+    Parameters
+    ----------
+    factor
+        Multiplier of the length of a step, at least 1; inf where the robot must never be.
+    """
+
+    global_id: str
+    name: str
+    storey: int
+    polygon: BaseGeometry
+    factor: float
+    rule: str
+
+
+_GAP = 0.05  # metres; floors up to twice as far apart, such as a space and a doorway, are one floor
+_NEVER_OBSTACLES = {
+    "IfcDoor": "a door is passable because it is a door",
+    "IfcDoorStandardCase": "a door is passable because it is a door",
+    "IfcSite": "terrain is not an element of a storey",
+    "IfcVirtualElement": "a virtual element has no body",
+}
+_QUARTER = 16  # segments of a quarter circle in a buffer
+
+
+@dataclass(frozen=True, eq=False)
+class IndoorEnvironment:
+    """Regions, obstacles, targets and zones of a building, for one task and one robot.
+
+    Parameters
+    ----------
+    storeys
+        What `storey` indexes in regions, obstacles, targets and cells: the building's storeys by the
+        height of their floor. A storey whose spaces lie at several heights is several of these.
+    levels
+        World height of the walkable floor of every storey, metres.
+    regions
+        Walkable floor, from all sources.
+    obstacles
+        What blocks the robot in its height band, on every storey.
+    targets
+        What the task wants visited, and what the user placed.
+    zones
+        Floor that costs more to cross.
+    left_out
+        GlobalId to the rule that keeps an element from being an obstacle.
+    outside_bands
+        GlobalIds of elements that no robot of this height meets on any storey.
+    issues
+        What could not be classified, with GlobalIds.
+    """
+
+    building: Building
+    task: Task
+    robot: Robot
+    storeys: tuple[Storey, ...]
+    levels: tuple[float, ...]
+    regions: tuple[Region, ...]
+    obstacles: tuple[Obstacle, ...]
+    targets: tuple[Target, ...]
+    zones: tuple[Zone, ...] = ()
+    left_out: tuple[tuple[str, str], ...] = ()
+    outside_bands: tuple[str, ...] = ()
+    issues: tuple[Issue, ...] = ()
+
+    def __repr__(self) -> str:
+        return (
+            f"IndoorEnvironment({self.building.name!r}, task {self.task.name!r}, robot {self.robot.name!r}: "
+            f"{len(self.regions)} regions, {len(self.obstacles)} obstacles, {len(self.targets)} targets)"
+        )
+
+    @cached_property
+    def _floors(self) -> tuple[BaseGeometry, ...]:
+        return tuple(
+            _floor([r.polygon for r in self.regions if r.storey == storey], self.robot.radius)
+            for storey in range(len(self.levels))
+        )
+
+    @cached_property
+    def _bodies(self) -> tuple[tuple[tuple[Obstacle, BaseGeometry], ...], ...]:
+        return tuple(
+            tuple((o, grown(o.footprint, self.robot.radius)) for o in self.obstacles_on(storey))
+            for storey in range(len(self.levels))
+        )
+
+    @property
+    def ground(self) -> int:
+        """The lowest storey with floor; a level split off a storey, such as a pit, only if there is no other."""
+        walkable = [s for s in range(len(self.levels)) if not self.floor(s).is_empty] or [0]
+        known = set(self.building.storeys)
+        return next((s for s in walkable if self.storeys[s] in known), walkable[0])
+
+    def floor(self, storey: int) -> BaseGeometry:
+        """Return where the middle of the robot may be, as far as the floor is concerned, metres."""
+        return self._floors[storey]
+
+    def obstacles_on(self, storey: int) -> tuple[Obstacle, ...]:
+        """Return the obstacles of one storey."""
+        return tuple(o for o in self.obstacles if o.storey == storey)
+
+    def bodies_on(self, storey: int) -> tuple[tuple[Obstacle, BaseGeometry], ...]:
+        """Return the obstacles of one storey with their footprints grown by the robot's radius."""
+        return self._bodies[storey]
+
+    def storeys_at(self, place: Place) -> tuple[int, ...]:
+        """Return the storeys a place may mean, best first.
+
+        Parameters
+        ----------
+        place
+            `(x, y)` or `(x, y, storey)`: metres, and the name, GlobalId or index of a storey. Best are
+            storeys with floor there, then those with an obstacle there, then the lowest walkable one.
+        """
+        if not all(math.isfinite(float(value)) for value in place[:2]):
+            raise ValueRangeError(f"({place[0]}, {place[1]}) is not a point.", "Give finite metres.")
+        point = shapely.Point(*place[:2])
+        storeys: Sequence[int] = range(len(self.levels))
+        if len(place) > 2 and place[2] is not None:
+            named = self.building.storeys[self.building.storey_index(place[2])].global_id
+            storeys = [s for s in storeys if self.storeys[s].global_id == named]
+        on = [s for s in storeys if self.floor(s).intersects(point)]
+        within = [s for s in storeys if any(body.intersects(point) for _, body in self.bodies_on(s))]
+        walkable = [s for s in (self.ground, *storeys) if s in storeys and not self.floor(s).is_empty]
+        return tuple(dict.fromkeys([*on, *within, *walkable, *storeys]))
+
+    def is_clear(self, storey: int, *points: Sequence[float]) -> bool:
+        """Tell whether the robot can be on a point, or drive straight from point to point, touching nothing."""
+        at = shapely.Point(*points[0][:2]) if len(points) == 1 else shapely.LineString([p[:2] for p in points])
+        on_floor = bool(shapely.buffer(self.floor(storey), 1e-9).covers(at))
+        return on_floor and not any(body.intersects(at) for _, body in self.bodies_on(storey))
+
+
+def grown(polygon: BaseGeometry, radius: float) -> BaseGeometry:
+    """Return a polygon grown by a radius, never by less: the arcs lie outside the true circles."""
+    if radius == 0:
+        return polygon
+    return shapely.buffer(polygon, radius / math.cos(math.pi / (4 * _QUARTER)), quad_segs=_QUARTER)
+
+
+def _floor(polygons: Sequence[BaseGeometry], radius: float) -> BaseGeometry:
+    """Join regions over small gaps and keep the robot's body on them."""
+    joined = shapely.buffer(shapely.union_all(polygons), _GAP, join_style="mitre")
+    return grown(shapely.buffer(joined, -_GAP, join_style="mitre"), -radius)
+
+
+def make_environment(
+    building: Building, task: Task, robot: Robot | None = None, *, start: Place | None = None
+) -> IndoorEnvironment:
+    """Work out where a robot can go in a building, what blocks it, and what a task wants visited.
+
+    Floor comes from spaces, else slabs, else the hull of the storey's walls, and from doorways and
+    passages. Everything solid in the robot's height band blocks, from just above the floor
+    (`robot.step_height`) to the robot's height, unless it is a door or the task says otherwise.
+
+    Parameters
+    ----------
+    building
+        As read, or written by hand.
+    task
+        Says what to visit; finding nothing is no error here.
+    robot
+        Its height and radius decide what blocks. The default is the paper's point, 1 m tall.
+    start
+        Where the job begins, `(x, y)` or `(x, y, storey)`: detections that name no storey lie on its
+        storey. Without it they lie on the lowest floor at their point.
+    """
+    from bimnav.tasks import match
+
+    robot = robot or Robot()
+    floors, issues = find_floors(building, robot)
+    levels = tuple(floor.level for floor in floors)
+    regions = tuple(
+        Region(global_id, name, storey, polygon, source)
+        for storey, floor in enumerate(floors)
+        for global_id, name, polygon, source in floor.pieces
+    )
+    walkable = sorted({region.storey for region in regions})
+
+    visited = {p.global_id: (p, why) for rule in task.targets for p, why in match(rule, building)}
+    left_out = {p.global_id: f"ignored: {why}" for rule in task.ignore for p, why in match(rule, building)}
+    if task.removes_targets:
+        left_out |= {g: f"target, taken away: {why}" for g, (_, why) in visited.items()}
+    chosen = {p.global_id: why for rule in task.obstacles for p, why in match(rule, building)}
+    candidates: list[tuple[Element, str]] = []
+    for element in building.elements:
+        if element.ifc_class in _NEVER_OBSTACLES:
+            left_out.setdefault(element.global_id, _NEVER_OBSTACLES[element.ifc_class])
+        elif task.obstacles and element.global_id not in chosen:
+            left_out.setdefault(element.global_id, "no obstacle rule of the task matches")
+        if element.shapes and element.global_id not in left_out:
+            candidates.append((element, chosen.get(element.global_id, "solid in the robot's height band")))
+    obstacles = tuple(_obstacles(candidates, robot, levels, walkable))
+    blocking = {obstacle.global_id for obstacle in obstacles}
+
+    def rated(rules: Iterable[Rule], factor: float | None) -> Iterable[Zone]:
+        for rule in rules:
+            for product, why in match(rule, building):
+                yield from _zones(product, levels, rule.factor if factor is None else factor, why)
+
+    environment = IndoorEnvironment(
+        building,
+        task,
+        robot,
+        tuple(floor.storey for floor in floors),
+        levels,
+        regions,
+        obstacles,
+        targets=(),
+        zones=(*rated(task.avoid, None), *rated(task.restricted, math.inf)),
+        left_out=tuple(sorted(left_out.items())),
+        outside_bands=tuple(e.global_id for e, _ in candidates if e.global_id not in blocking),
+        issues=issues,
+    )
+    targets = [_found(product, why, environment) for product, why in visited.values()]
+    home = None if start is None else environment.storeys_at(start)[0]
+    targets += [_placed(detection, environment, home) for detection in building.detections]
+    lost = tuple(p.global_id for (p, _), t in zip(visited.values(), targets, strict=False) if t is None)
+    if lost:
+        message = f"{len(lost)} targets of task {task.name!r} have no geometry, so no place to go to."
+        issues += (Issue("target-without-shape", message, lost, "error", "Ask for an export with bodies."),)
+    return replace(environment, targets=tuple(t for t in targets if t is not None), issues=issues)
+
+
+def _obstacles(
+    candidates: Sequence[tuple[Element, str]], robot: Robot, levels: Sequence[float], walkable: Sequence[int]
+) -> Iterable[Obstacle]:
+    shapes = [(element, why, shape) for element, why in candidates for shape in element.shapes]
+    for storey in walkable:
+        low, high = levels[storey] + robot.step_height, levels[storey] + robot.height
+        parts: dict[str, list[Footprint]] = {}
+        for (element, _, _), part in zip(shapes, footprints_of([s for _, _, s in shapes], low, high), strict=True):
+            if part is not None and not part.polygon.is_empty:
+                parts.setdefault(element.global_id, []).append(part)
+        for element, why in candidates:
+            if element.global_id in parts:
+                whole = merge_footprints(parts[element.global_id])
+                yield Obstacle(
+                    element.global_id,
+                    element.name,
+                    element.ifc_class,
+                    storey,
+                    whole.polygon,
+                    whole.low,
+                    whole.high,
+                    whole.quality,
+                    why,
+                )
+
+
+def _zones(product: Element | Space, levels: Sequence[float], factor: float, why: str) -> Iterable[Zone]:
+    bounds = product.bounds
+    if bounds is None:
+        return
+    polygon = outline(product.shapes)
+    for storey, level in enumerate(levels):
+        if bounds[0, 2] - NEAR <= level < bounds[1, 2]:
+            yield Zone(product.global_id, product.name, storey, polygon, factor, why)
+
+
+def _found(product: Element | Space, why: str, environment: IndoorEnvironment) -> Target | None:
+    """Make a target of an element: its destination is the middle of its plan view."""
+    bounds = product.bounds
+    if bounds is None:
+        return None
+    polygon = outline(product.shapes)
+    center = polygon.centroid if polygon.area > 0 else shapely.box(*bounds[0, :2], *bounds[1, :2]).centroid
+    storey = _storey_below(environment, center, float(bounds[0, 2]))
+    destination = (center.x, center.y, environment.levels[storey])
+    return Target(product.global_id, product.name, storey, destination, polygon, "model", why)
+
+
+def _storey_below(environment: IndoorEnvironment, point: BaseGeometry, z: float) -> int:
+    """Return the storey that something at a height stands on: the highest floor below it, under it if any is."""
+    walkable = sorted({region.storey for region in environment.regions}) or [0]
+    below = [s for s in walkable if environment.levels[s] <= z + NEAR] or walkable[:1]
+    under = [s for s in below if environment.floor(s).intersects(point)]
+    return (under or below)[-1]
+
+
+def _placed(detection: Detection, environment: IndoorEnvironment, home: int | None) -> Target:
+    """Make a target of a detection: on the storey it names, else by its height, else at home or the lowest floor."""
+    point = shapely.Point(detection.x, detection.y)
+    if detection.storey is None and detection.z is not None:
+        storey = _storey_below(environment, point, detection.z)
+    elif detection.storey is None and home is not None:
+        storey = home
+    else:
+        storey = environment.storeys_at((detection.x, detection.y, detection.storey))[0]
+    footprint = None
+    if detection.size is not None:
+        width, depth = (side / 2 for side in detection.size)
+        x, y = detection.x, detection.y
+        footprint = shapely.box(x - width, y - depth, x + width, y + depth)
+    return Target(
+        detection.global_id,
+        detection.name,
+        storey,
+        (detection.x, detection.y, environment.levels[storey]),
+        footprint,
+        "user",
+        "placed by the user",
+    )

@@ -1,0 +1,165 @@
+"""Reading IFC models."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bimnav.errors import CacheError, InputError
+
+if TYPE_CHECKING:
+    from bimnav.building import Building
+    from bimnav.ifc._model import Model
+    from bimnav.ifc._store import Cache, CacheInfo
+    from bimnav.ifc._watch import Limits
+
+__all__ = ["cache_info", "clear_cache", "read_ifc"]
+
+_LOG = logging.getLogger(__name__)
+
+_PATIENCE = 2.0  # seconds before progress shows by itself
+_REFRESH = 0.1
+_WIDTH = 79
+
+Progress = Callable[[int, int, str], None]
+
+
+def read_ifc(
+    *paths: str | PathLike[str],
+    cache: bool | str | PathLike[str] = True,
+    isolate: bool = True,
+    progress: bool | Progress | None = None,
+    timeout: float | None = None,
+    memory: int | None = None,
+) -> Building:
+    """Read a building from an IFC file.
+
+    The file is read in a process of its own, so that one that crashes the geometry kernel is an error and
+    not the end of the program. A product that crashes or stalls the kernel is set aside and listed in
+    `building.ledger.lost`. What was read once is kept in a cache.
+
+    Parameters
+    ----------
+    paths
+        One IFC file (STEP text: IFC2X3, IFC4 or IFC4X3), or an .ifczip that holds one.
+    cache
+        Whether to use the cache, or the folder of another one. See `cache_info`.
+    isolate
+        Whether to read in a process of its own. Without it a bad file can crash or stall this one, and
+        `timeout` and `memory` do not hold.
+    progress
+        Whether to show on standard error how far the reading is, or a function to call with products
+        done, their total, and what is being worked on. None shows it on a terminal if it takes long.
+    timeout
+        Seconds after which to give up; half an hour if not given.
+    memory
+        Bytes the reading process may use, where the system can limit it.
+
+    Returns
+    -------
+    building
+        In metres and world coordinates.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read; its leaves tell a missing file from a damaged one, and so on.
+    ReaderError
+        If the reading process crashed, took too long or needed too much memory.
+    """
+    if len(paths) != 1:
+        raise InputError(
+            f"read_ifc was given {len(paths)} files.", "Give one; several cannot be joined yet.", {"files": len(paths)}
+        )
+    from bimnav.ifc._model import to_building
+    from bimnav.ifc._select import selector_for
+    from bimnav.ifc._text import digest
+    from bimnav.ifc._watch import Limits
+
+    path = Path(paths[0])
+    limits = Limits() if timeout is None else Limits(timeout=timeout)
+    limits = replace(limits, memory=memory)
+    sha256 = digest(path)
+    with _Display(path.name, progress) as report:
+        model = _model_of(path, sha256, _cache_at(cache), limits if isolate else None, report)
+    selector = selector_for(path, sha256, model)
+    return to_building(model, sources=(str(path),), selector=selector.select, property_reader=selector.properties)
+
+
+def cache_info(folder: Path | None = None) -> CacheInfo:
+    """Return where the cache is and what lies in it."""
+    from bimnav.ifc import _store
+
+    return _store.cache_info(folder)
+
+
+def clear_cache(folder: Path | None = None) -> int:
+    """Remove all models from the cache and return how many there were."""
+    from bimnav.ifc import _store
+
+    return _store.clear_cache(folder)
+
+
+def _cache_at(cache: bool | str | PathLike[str]) -> Cache | None:
+    from bimnav.ifc._store import Cache, cache_folder
+
+    if cache is False:
+        return None
+    try:
+        return Cache(cache_folder() if cache is True else Path(cache))
+    except CacheError as error:
+        _LOG.warning("nothing is cached: %s", error)
+        return None
+
+
+def _model_of(path: Path, sha256: str, cache: Cache | None, limits: Limits | None, report: Progress) -> Model:
+    """Take a model from the cache, else read it and keep it there."""
+    from bimnav.ifc._store import key_of
+    from bimnav.ifc._text import digest
+    from bimnav.ifc._watch import read_apart, read_here
+
+    key = key_of(sha256)
+    if cache and (model := cache.get(key)):
+        return model
+    reading = read_here(path, report) if limits is None else read_apart(path, limits=limits, report=report)
+    if digest(path) != sha256:
+        raise InputError(f"{path.name} changed while it was read.", "Read it again.", {"path": str(path)})
+    if cache and reading.is_repeatable:
+        cache.put(key, reading.packed)
+    return reading.model
+
+
+def _on_terminal() -> bool:
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
+class _Display:
+    """Shows how far a reading is: on standard error, or through the caller's function."""
+
+    def __init__(self, name: str, wanted: bool | Progress | None) -> None:
+        self._name = name
+        self._call = wanted if callable(wanted) else None
+        self._shows = _on_terminal() if wanted is None else wanted is True
+        self._next = time.monotonic() + (_PATIENCE if wanted is None else 0.0)
+        self._shown = False
+
+    def __enter__(self) -> Progress:
+        return self._call or self._show
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown:
+            sys.stderr.write(f"\r{'':{_WIDTH}}\r")
+
+    def _show(self, done: int, total: int, text: str) -> None:
+        now = time.monotonic()
+        if self._shows and now >= self._next:
+            self._next, self._shown = now + _REFRESH, True
+            count = f"{done}/{total} " if total else ""
+            sys.stderr.write(f"\r{f'{self._name}: {count}{text}'[:_WIDTH]:{_WIDTH}}")
+            sys.stderr.flush()

@@ -1,0 +1,159 @@
+"""One IFC file as a `Model`: the work of the reading process.
+
+The kernel tessellates every product un-cut, in one pass, by its fastest means; openings and roof cuts are
+subtracted by our own. That is several times faster than letting the kernel do it, and closes solids it
+leaves open. Nothing is lost in silence: every product with a representation is read, left out by a named
+rule, or listed as lost with the reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
+
+from bimnav.ifc._findings import Findings
+from bimnav.ifc._geometry import Geometry, read_geometry
+from bimnav.ifc._kernel import Entity, File
+from bimnav.ifc._model import Model, to_building
+from bimnav.ifc._products import BodyFinder, Relations, identify, left_out_by_class, open_circles, sanitize, sorted_of
+from bimnav.ifc._semantics import Rows, derived_storey, lowest_floor, storey_rows, text_of
+from bimnav.ifc._units import length_unit
+
+__all__ = ["Heartbeat", "extract", "to_building"]
+
+Heartbeat = Callable[[int, int, str], None]
+
+_CRASHED = "it crashed the geometry kernel"
+
+
+def _silent(done: int, total: int, global_id: str) -> None:
+    """Take no notice."""
+
+
+def extract(
+    file: File,
+    *,
+    heartbeat: Heartbeat = _silent,
+    skip: Collection[str] = (),
+    log: Any = None,
+) -> Model:
+    """Read a whole file.
+
+    The file is changed in memory: text attributes written as `*` are emptied, and helper entities are
+    added. Equal files give equal models.
+
+    Parameters
+    ----------
+    file
+        An open file; its placements and representations must be free of circles.
+    heartbeat
+        Called with the number of products begun so far, their total, and the GlobalId of the next one
+        before the kernel touches it.
+    skip
+        GlobalIds, as given to `heartbeat`, of products that crashed the kernel before; they are lost.
+    log
+        The in-memory `ifcopenshell.logger` the file was opened with; its errors become issues.
+
+    Raises
+    ------
+    IfcStructureError
+        If there is no project.
+    IfcUnitsError
+        If there is not exactly one sensible length unit.
+    """
+    unit, unit_scale = length_unit(file)
+    products = sorted_of(file, "IfcProduct")
+    ids, renamed = identify(products)
+    relations = Relations.of(file)
+    findings = Findings(ids)
+    findings.about_file(renamed, sanitize(products), open_circles(file, relations.circular), log)
+
+    asked = [product for product in products if product.Representation]
+    no_part = left_out_by_class(file)
+    solids, contexts, left_out = _sort_out(asked, no_part)
+    lost = {p.id(): _CRASHED for p in asked if p.id() in solids and ids[p.id()] in skip}
+    wanted = [product for product in asked if product.id() in solids and product.id() not in lost]
+    begun: set[int] = set()
+
+    def working_on(step_id: int) -> None:
+        begun.add(step_id)
+        heartbeat(len(begun) - 1, len(wanted), ids[step_id])
+
+    geometry = read_geometry(file, wanted, solids, contexts, relations.openings_of(), working_on)
+    lost = dict(sorted((lost | geometry.lost).items()))
+    findings.about_geometry(geometry, lost, left_out)
+    meshes, arrays, shapes = geometry.pack(product.id() for product in wanted)
+    rows = Rows(file, ids, relations, geometry.bounds, lambda step_id: shapes.get(step_id, []), unit_scale)
+    parts = [product for product in products if product.id() not in no_part]
+    tables = {
+        "project": text_of(sorted_of(file, "IfcProject")[0].Name),
+        "schema": file.schema_identifier,
+        "unit": unit,
+        "unit_scale": unit_scale,
+        "meshes": meshes,
+        **_contents(file, parts, rows, geometry, findings, storey_rows(file, ids, unit_scale)),
+        "issues": findings.rows,
+        "ledger": {
+            "asked": [ids[product.id()] for product in asked],
+            "left_out": {ids[step_id]: rule for step_id, rule in left_out.items()},
+            "lost": {ids[step_id]: reason for step_id, reason in lost.items()},
+        },
+    }
+    return Model(tables, arrays)
+
+
+def _sort_out(
+    asked: Sequence[Entity], no_part: Mapping[int, str]
+) -> tuple[dict[int, list[Entity]], set[int], dict[int, str]]:
+    """Find the solids of each product, the contexts they are in, and the products to leave out, with the rule."""
+    finder = BodyFinder()
+    solids: dict[int, list[Entity]] = {}
+    contexts: set[int] = set()
+    left_out: dict[int, str] = {}
+    for product in asked:
+        step_id = product.id()
+        own, where = ([], set()) if step_id in no_part else finder.solids_of(product)
+        if own:
+            solids[step_id] = own
+            contexts |= where
+        else:
+            left_out[step_id] = no_part.get(step_id, "no-body")
+    return solids, contexts, left_out
+
+
+def _contents(
+    file: File,
+    products: Sequence[Entity],
+    rows: Rows,
+    geometry: Geometry,
+    findings: Findings,
+    storeys: list[dict[str, Any]],
+) -> dict[str, list[dict[str, Any]]]:
+    spaces = [product for product in products if product.is_a("IfcSpace")]
+    voids = [product for product in products if product.is_a("IfcFeatureElementSubtraction")]
+    apart = {product.id() for product in (*spaces, *voids)}
+    others = [product for product in products if product.id() not in apart]
+    element_rows = [rows.element(product) for product in others]
+    space_rows = [rows.space(space) for space in spaces]
+    if storeys:
+        findings.about_storeys(storeys, element_rows, space_rows)
+    else:
+        storeys = [derived_storey(file, lowest_floor(spaces, others, geometry.bounds))]
+        for row in (*element_rows, *space_rows):
+            row["storey"] = storeys[0]["global_id"]
+        findings.add(
+            "no-storeys",
+            f"the file has no storeys; one was made at {storeys[0]['elevation']:.3f} m, the lowest floor.",
+            hint="Export storeys (levels).",
+        )
+    door_rows = [rows.door(product) for product in others if product.is_a("IfcDoor")]
+    connector_rows, without = rows.connectors(others)
+    findings.about_contents(element_rows, space_rows, door_rows, without)
+    return {
+        "storeys": storeys,
+        "elements": element_rows,
+        "spaces": space_rows,
+        "openings": [rows.opening(void) for void in voids],
+        "doors": door_rows,
+        "connectors": connector_rows,
+    }

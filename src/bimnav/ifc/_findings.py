@@ -1,0 +1,216 @@
+"""What was lost or looks wrong in a model, folded to one issue of each kind."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+from bimnav.ifc._geometry import Geometry
+from bimnav.ifc._kernel import Entity
+
+__all__ = ["Findings"]
+
+Row = dict[str, Any]
+
+_LEVEL_GAP = 1.0  # metres; storeys closer than this are levels of construction, not floors one above the other
+_HEADROOM = 0.1  # metres; a building with storeys is higher
+_EXAMPLES = 3
+
+
+class Findings:
+    """Collects issues as rows of a `Model`.
+
+    Parameters
+    ----------
+    ids
+        Step id to GlobalId, of all products.
+    """
+
+    def __init__(self, ids: Mapping[int, str]) -> None:
+        self._ids = ids
+        self.rows: list[Row] = []
+
+    def add(
+        self,
+        code: str,
+        message: str,
+        found: Iterable[int | str] | None = None,
+        *,
+        severity: str = "warning",
+        hint: str = "",
+    ) -> None:
+        """Note one issue; `{n}` in the message becomes the number of what was found, and none is no issue."""
+        global_ids = [self._ids[each] if isinstance(each, int) else each for each in found or ()]
+        if found is not None and not global_ids:
+            return
+        self.rows.append(
+            {
+                "code": code,
+                "message": message.replace("{n}", str(len(global_ids))),
+                "global_ids": global_ids,
+                "severity": severity,
+                "hint": hint,
+            }
+        )
+
+    def about_file(self, renamed: Sequence[int], starred: Sequence[Entity], circular: Sequence[int], log: Any) -> None:
+        """Note what is wrong with identities and text, and what the parser said."""
+        self.add(
+            "bad-global-id",
+            "{n} products have a GlobalId that is empty, malformed or taken; they got others, listed here.",
+            renamed,
+            hint="Repair the GlobalIds in the authoring tool; otherwise other files cannot refer to these products.",
+        )
+        self.add(
+            "star-attributes",
+            "{n} products have names or tags written as *; they were read as empty.",
+            [product.id() for product in starred],
+            severity="info",
+        )
+        self.add(
+            "part-of-itself",
+            "{n} products are parts of their own parts; the last such statement was dropped.",
+            dict.fromkeys(circular),
+            hint="Repair the aggregation in the authoring tool.",
+        )
+        said = [message for message in (log.log_messages() if log else ()) if message.severity >= log.LOG_ERROR]
+        errors = [" ".join(str(message.message).split()) for message in said]
+        if errors:
+            self.add(
+                "parser-log",
+                f"the parser reported {len(errors)} errors: {_fold(errors)}.",
+                hint="The file may be damaged; export it again.",
+            )
+
+    def about_geometry(self, geometry: Geometry, lost: Mapping[int, str], left_out: Mapping[int, str]) -> None:
+        """Note which bodies are missing or doubtful."""
+        self.add(
+            "lost-shape",
+            f"the geometry of {{n}} products could not be read, or not all of it: {_fold(lost.values())}.",
+            lost,
+            severity="error",
+            hint="Export these products with simpler geometry; what is missing blocks nothing.",
+        )
+        self.add(
+            "flawed-shape",
+            "{n} products were read although the geometry kernel complained: "
+            f"{_fold(error for errors in geometry.flawed.values() for error in dict.fromkeys(errors))}.",
+            geometry.flawed,
+            hint="Faces may be missing; look at these products.",
+        )
+        self.add(
+            "open-shape",
+            "{n} products have bodies that do not close; they are taken as sheets.",
+            [step_id for step_id in geometry.shapes if geometry.is_open(step_id)],
+            severity="info",
+        )
+        self.add(
+            "opening-not-cut",
+            "the openings of {n} products could not be subtracted; their doorways may look closed.",
+            geometry.uncut,
+            hint="Doors are passable all the same; passages without a door are not.",
+        )
+        self.add(
+            "eaten-by-openings",
+            "the openings of {n} products leave nothing of them.",
+            geometry.eaten,
+            severity="info",
+        )
+        self.add(
+            "no-body",
+            "{n} products have a representation, but no body: only an axis, a box or a plan symbol.",
+            [step_id for step_id, rule in left_out.items() if rule == "no-body"],
+            severity="info",
+        )
+
+    def about_storeys(self, storeys: Sequence[Row], elements: Sequence[Row], spaces: Sequence[Row]) -> None:
+        """Note storeys that hold nothing or are only levels, and what lies outside all of them."""
+        holding = {row["storey"] for row in (*elements, *spaces)}
+        self.add(
+            "empty-storey",
+            "{n} storeys hold nothing.",
+            [row["global_id"] for row in storeys if row["global_id"] not in holding],
+            severity="info",
+            hint="They may be levels of reference; their floors come from rooms and slabs, if any.",
+        )
+        span = storeys[-1]["elevation"] - storeys[0]["elevation"]
+        if 0 < span < _HEADROOM:
+            self.add(
+                "doubtful-unit",
+                f"all {len(storeys)} storeys lie within {span:.3g} m: the file may state a wrong length unit.",
+                hint="Compare a known length in the authoring tool.",
+            )
+        close = [
+            (lower, upper) for lower, upper in pairwise(storeys) if upper["elevation"] - lower["elevation"] < _LEVEL_GAP
+        ]
+        pairs = ", ".join(f"{lower['name']} and {upper['name']}" for lower, upper in close[:_EXAMPLES])
+        self.add(
+            "level-storey",
+            f"{{n}} storeys lie less than a metre above or below another: {pairs}.",
+            dict.fromkeys(row["global_id"] for pair in close for row in pair),
+            severity="info",
+            hint="They may be split levels or levels of construction.",
+        )
+        self.add(
+            "outside-storeys",
+            "{n} elements belong to no storey.",
+            [row["global_id"] for row in elements if row["storey"] is None and row["shapes"]],
+            severity="info",
+            hint="They are sorted by their geometry; assign them to storeys in the authoring tool.",
+        )
+
+    def about_contents(
+        self, elements: Sequence[Row], spaces: Sequence[Row], doors: Sequence[Row], without: Iterable[str]
+    ) -> None:
+        """Note what a robot would miss: rooms, slabs, openings, and the shapes of elements."""
+        shaped = {row["global_id"] for row in elements if row["shapes"]}
+        present = shaped | {row["parent"] for row in elements}
+        self.add(
+            "no-shape",
+            "{n} elements have neither geometry nor parts.",
+            [row["global_id"] for row in elements if row["global_id"] not in present],
+            severity="info",
+        )
+        if not shaped:
+            self.add("no-geometry", "the file has no element with geometry.", hint="Join it to a file that has.")
+        if not spaces:
+            self.add(
+                "no-spaces",
+                "the file has no rooms (IfcSpace).",
+                hint="Export rooms; the floor is taken from slabs until then.",
+            )
+        self.add(
+            "space-without-shape",
+            "{n} rooms have no geometry.",
+            [row["global_id"] for row in spaces if not row["shapes"]],
+            hint="Export the bodies of rooms.",
+        )
+        slabs = [row for row in elements if row["ifc_class"].startswith("IfcSlab") and row["shapes"]]
+        if all(row["predefined_type"] in ("LANDING", "ROOF") for row in slabs):
+            self.add(
+                "no-slabs",
+                "the file has no floor slab.",
+                severity="info" if spaces else "warning",
+                hint="The floor is taken from rooms.",
+            )
+        self.add(
+            "door-without-opening",
+            "{n} doors fill no opening.",
+            [row["global_id"] for row in doors if row["opening"] is None],
+            severity="info",
+            hint="Their own outline is taken as the doorway.",
+        )
+        self.add(
+            "connector-without-shape",
+            "{n} stairs, ramps or lifts have no geometry and connect nothing.",
+            without,
+        )
+
+
+def _fold(messages: Iterable[str]) -> str:
+    """Put equal messages together and name the most frequent."""
+    counted = Counter(messages).most_common()
+    folded = [f"{message[:120]} ({count}x)" if count > 1 else message[:120] for message, count in counted]
+    return "; ".join(folded[:_EXAMPLES]) + (f"; and {len(folded) - _EXAMPLES} more" if len(folded) > _EXAMPLES else "")

@@ -1,0 +1,129 @@
+"""What a reading process hands back: tables of plain values and arrays, nothing else.
+
+A `Model` crosses the process border and lies in the cache as one JSON text and one npz archive;
+`to_building` turns it into the values the rest of the library works on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bimnav.building import (
+    Building,
+    Connector,
+    Door,
+    Element,
+    Issue,
+    Ledger,
+    Mesh,
+    Opening,
+    Shape,
+    Space,
+    Storey,
+)
+
+__all__ = ["Model", "to_building"]
+
+
+@dataclass(slots=True)
+class Model:
+    """One IFC file, read.
+
+    Parameters
+    ----------
+    tables
+        JSON values:
+
+        - `project`: name; `schema`; `unit`: name of the length unit; `unit_scale`: metres per unit
+        - `storeys`: `[{global_id, name, elevation}]`, lowest first
+        - `meshes`: `[{quality}]`, one per mesh of the arrays
+        - `elements`: `[{global_id, ifc_class, name, type_name, object_type, predefined_type, tag,
+          storey, space, parent, step_id, shapes: [index of a shape, ...]}]`
+        - `spaces`: `[{global_id, name, long_name, storey, step_id, shapes}]`
+        - `openings`: `[{global_id, host, fillings: [global_id], shapes}]`
+        - `doors`: `[{global_id, opening, width, height}]`
+        - `connectors`: `[{global_id, name, kind, parts, low, high}]`
+        - `issues`: `[{code, message, global_ids, severity, hint}]`
+        - `ledger`: `{asked: [global_id], left_out: {global_id: rule}, lost: {global_id: reason}}`
+    arrays
+        - `vertices` (n, 3) float64 metres and `faces` (m, 3) int32, all meshes one after the other;
+          faces count from their own mesh's first vertex
+        - `vertex_offsets`, `face_offsets` (meshes + 1,) int64
+        - `shape_mesh` (shapes,) int32 and `placements` (shapes, 4, 4) float64
+    """
+
+    tables: dict[str, Any] = field(default_factory=dict)
+    arrays: dict[str, NDArray[np.generic]] = field(default_factory=dict)
+
+
+def to_building(
+    model: Model,
+    *,
+    sources: Sequence[str] = (),
+    selector: Callable[[str], Iterable[str]] | None = None,
+    property_reader: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None,
+) -> Building:
+    """Turn tables and arrays into the values the rest of the library works on.
+
+    Parameters
+    ----------
+    sources
+        Paths of the files the model was read from.
+    selector, property_reader
+        As in `Building`.
+    """
+    tables = model.tables
+    shapes = _shapes_of(model)
+
+    def with_shapes(row: Mapping[str, Any]) -> dict[str, Any]:
+        known = {name: value for name, value in row.items() if name not in ("step_id", "shapes")}
+        return known | {"shapes": tuple(shapes[index] for index in row["shapes"])}
+
+    elements = {row["global_id"]: Element(**with_shapes(row)) for row in tables["elements"]}
+    openings = {
+        row["global_id"]: Opening(**with_shapes(row) | {"fillings": tuple(row["fillings"])})
+        for row in tables["openings"]
+    }
+    ledger = tables["ledger"]
+    return Building(
+        name=tables["project"] or (Path(sources[0]).stem if sources else ""),
+        storeys=tuple(Storey(**row) for row in tables["storeys"]),
+        spaces=tuple(Space(**with_shapes(row)) for row in tables["spaces"]),
+        elements=tuple(elements.values()),
+        doors=tuple(
+            Door(elements[row["global_id"]], openings.get(row["opening"]), row["width"], row["height"])
+            for row in tables["doors"]
+        ),
+        openings=tuple(openings.values()),
+        connectors=tuple(Connector(**row | {"parts": tuple(row["parts"])}) for row in tables["connectors"]),
+        issues=tuple(Issue(**row | {"global_ids": tuple(row["global_ids"])}) for row in tables["issues"]),
+        ledger=Ledger(tuple(ledger["asked"]), dict(ledger["left_out"]), dict(ledger["lost"])),
+        schema=tables["schema"],
+        unit=tables["unit"],
+        sources=tuple(sources),
+        selector=selector,
+        property_reader=property_reader,
+    )
+
+
+def _shapes_of(model: Model) -> list[Shape]:
+    arrays: dict[str, NDArray[Any]] = model.arrays
+    vertex, face = arrays["vertex_offsets"], arrays["face_offsets"]
+    meshes = [
+        Mesh(
+            arrays["vertices"][vertex[i] : vertex[i + 1]],
+            arrays["faces"][face[i] : face[i + 1]],
+            row["quality"],
+        )
+        for i, row in enumerate(model.tables["meshes"])
+    ]
+    return [
+        Shape(meshes[mesh], placement)
+        for mesh, placement in zip(arrays["shape_mesh"], arrays["placements"], strict=True)
+    ]

@@ -1,0 +1,114 @@
+"""From a path to a `Model` in this very process: text, first look, kernel, and the check that nothing was lost."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, Protocol
+
+from bimnav.errors import IfcSchemaError, IfcSyntaxError
+from bimnav.ifc._model import Model
+from bimnav.ifc._prescan import Prescan, scan
+from bimnav.ifc._text import load
+
+__all__ = ["Listener", "open_copy", "read"]
+
+_UNKNOWN = re.compile(r"Entity with name '([^']*)' not found in schema")
+
+
+class Listener(Protocol):
+    """Hears how far a reading is."""
+
+    def stage(self, name: str) -> None:
+        """Hear which part of the work begins."""
+
+    def beat(self, done: int, total: int, global_id: str) -> None:
+        """Hear which product the kernel touches next; empty if none."""
+
+
+def read(path: Path, folder: Path, listener: Listener, *, skip: Collection[str] = (), check: bool = True) -> Model:
+    """Read one file.
+
+    Parameters
+    ----------
+    path
+        A model, or an archive that holds one.
+    folder
+        Where to put the text; what is scanned is what the kernel opens, whatever happens to `path`.
+    listener
+        Told how far the work is.
+    skip
+        GlobalIds of products the kernel must not touch; they count as lost.
+    check
+        Whether to look through the text first.
+    """
+    listener.stage("checking")
+    text = load(path)
+    said = scan(text, path.name, beat=lambda *_: listener.stage("checking")) if check else None
+    listener.stage("opening")
+    file, log = open_copy(text, folder / "model.ifc", path.name)
+    del text
+    from bimnav.ifc._extract import extract
+
+    if said is not None:
+        _check_parsed(file, log, said, path.name)
+    listener.stage("reading")
+    model = extract(file, heartbeat=listener.beat, skip=skip, log=log)
+    listener.stage("finishing")
+    if said is not None:
+        _close_ledger(model, said)
+    return model
+
+
+def open_copy(text: bytes, copy: Path, name: str) -> tuple[Any, Any]:
+    """Write a model's text to `copy` and open that; return the file and what the parser had to say.
+
+    Raises
+    ------
+    IfcSchemaError, IfcSyntaxError
+        If the parser refuses it; `name` is what the message calls it.
+    """
+    import ifcopenshell
+
+    kernel: Any = ifcopenshell
+    copy.write_bytes(text)
+    log = kernel.logger()
+    log.output_format(log.FMT_INMEMORY)
+    log.verbosity(log.LOG_ERROR)
+    try:
+        return kernel.open(copy, format=".ifc", logger=log), log
+    except kernel.SchemaError as error:
+        raise IfcSchemaError(f"{name}: {error}.", "Export it as IFC2X3, IFC4 or IFC4X3.", {"file": name}) from error
+    except (kernel.Error, RuntimeError, OSError) as error:
+        said = "; ".join(str(message.message)[:200] for message in log.log_messages()[:3]) or str(error)
+        raise IfcSyntaxError(
+            f"{name} cannot be parsed: {said}.", "The exporter is at fault; ask for a fresh export.", {"file": name}
+        ) from error
+
+
+def _check_parsed(file: Any, log: Any, said: Prescan, name: str) -> None:
+    """Refuse a file of which the parser understood less than the text holds."""
+    parsed = len(file.entity_names())
+    unknown = sum(bool(_UNKNOWN.match(str(message.message))) for message in log.log_messages())
+    if parsed + unknown < said.instances:
+        raise IfcSyntaxError(
+            f"{name} holds {said.instances} entities, of which only {parsed} could be parsed.",
+            "The rest would be lost without a word; ask for a fresh export.",
+            {"file": name, "entities": said.instances, "parsed": parsed},
+        )
+
+
+def _close_ledger(model: Model, said: Prescan) -> None:
+    """Note it as an error if the kernel saw fewer products, or more, than the text holds."""
+    counted, asked = sum(said.products.values()), len(model.tables["ledger"]["asked"])
+    if counted != asked:
+        model.tables["issues"].append(
+            {
+                "code": "open-ledger",
+                "message": f"the text holds {counted} products with a representation, of which {asked} were looked at.",
+                "global_ids": [],
+                "severity": "error",
+                "hint": "Some are of a class that the schema does not know; export the model again.",
+            }
+        )

@@ -1,0 +1,86 @@
+"""Queries and properties of a model that was read before; it is opened again when first asked."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bimnav.errors import FileMissingError, InputError
+from bimnav.ifc._model import Model
+from bimnav.ifc._reading import open_copy
+from bimnav.ifc._text import digest, load
+
+__all__ = ["Selector", "selector_for"]
+
+
+def selector_for(path: Path, sha256: str, model: Model) -> Selector:
+    """Return what answers for the elements and spaces of a model that was read from `path`."""
+    rows = (*model.tables["elements"], *model.tables["spaces"])
+    return Selector(path.absolute(), sha256, {row["step_id"]: row["global_id"] for row in rows})
+
+
+class Selector:
+    """Answers for one model; it is opened again when first asked, if it is still the one that was read.
+
+    Parameters
+    ----------
+    path
+        The file.
+    sha256
+        Its digest when it was read.
+    ids
+        Step id to GlobalId of every product there is an answer about; two products with one GlobalId in
+        the file have two here.
+    """
+
+    def __init__(self, path: Path, sha256: str, ids: Mapping[int, str]) -> None:
+        self._path, self._sha256, self._ids = path, sha256, dict(ids)
+        self._answers: dict[str, tuple[str, ...]] = {}
+        self._opened: Any = None
+
+    def __reduce__(self) -> tuple[type[Selector], tuple[Path, str, dict[int, str]]]:
+        return type(self), (self._path, self._sha256, self._ids)
+
+    def select(self, query: str) -> tuple[str, ...]:
+        """Return the GlobalIds of what a query picks; each distinct query is evaluated once.
+
+        Raises
+        ------
+        SelectorError
+            If the query cannot be parsed or evaluated, or names what does not exist.
+        InputError
+            If the file is gone or has changed.
+        """
+        if query not in self._answers:
+            from bimnav.ifc._query import evaluate
+
+            self._answers[query] = evaluate(self._file, self._ids, query)
+        return self._answers[query]
+
+    def properties(self, global_id: str) -> dict[str, dict[str, Any]]:
+        """Return the property sets of a product, those of its type included, as the file writes them."""
+        from bimnav.ifc._query import properties_of
+
+        for step_id, known in self._ids.items():
+            if known == global_id:
+                return properties_of(self._file.by_id(step_id))
+        return {}
+
+    @property
+    def _file(self) -> Any:
+        if self._opened is None:
+            try:
+                found = digest(self._path)
+            except FileMissingError as error:
+                raise FileMissingError(
+                    f"{self._path} is gone; queries and properties need it.", "Put it back.", error.context
+                ) from error
+            if found != self._sha256:
+                raise InputError(
+                    f"{self._path} has changed since it was read.", "Read it again.", {"path": str(self._path)}
+                )
+            with tempfile.TemporaryDirectory(prefix="bimnav-", ignore_cleanup_errors=True) as folder:
+                self._opened, _ = open_copy(load(self._path), Path(folder) / "model.ifc", self._path.name)
+        return self._opened

@@ -1,0 +1,7 @@
+"""Tasks: what a robot is to visit in any building, what blocks it, and why each element was picked."""
+
+from bimnav.tasks._files import TaskInfo, list_tasks, load_task, task_schema
+from bimnav.tasks._match import Match, match
+from bimnav.tasks._task import Destination, Rule, Task
+
+__all__ = ["Destination", "Match", "Rule", "Task", "TaskInfo", "list_tasks", "load_task", "match", "task_schema"]

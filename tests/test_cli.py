@@ -1,0 +1,173 @@
+"""The command line, as a user meets it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import bimnav as bn
+from bimnav.cli import main
+from tests.conftest import real_model
+
+APARTMENT = str(bn.sample("apartment"))
+
+
+def test_a_run_prints_what_was_done(capsys, tmp_path):
+    assert main(["run", APARTMENT, "--cell", "0.5ft", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "4 of 4 targets" in printed
+    assert "proved shortest" in printed
+    assert "touches no obstacle" in printed
+    assert "a point, as in the paper" in printed
+    assert str(tmp_path / "plan.png") in printed
+
+
+def test_a_run_prints_one_json_object(capsys):
+    assert main(["run", APARTMENT, "--cell", "1ft", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert {
+        "model", "schema", "task", "cell_size", "storeys", "nodes", "targets", "conflicts", "tour", "simulation",
+        "issues", "files",
+    } <= set(report)  # fmt: skip
+    assert report["cell_size"] == 0.3048
+    assert {"regular", "obstacle", "target"} <= set(report["nodes"])
+    assert all(target["reached"] for target in report["targets"])
+    assert len(report["conflicts"]) == 1
+    assert report["files"] == []
+
+
+def test_targets_come_from_options_and_files(capsys, tmp_path):
+    seen = tmp_path / "seen.csv"
+    seen.write_text("name,x,y\njuice,1.0,13.5\n")
+    arguments = ["run", APARTMENT, "--cell", "0.1", "--target", "mud@5,18.5", "--targets", str(seen), "--json"]
+    assert main(arguments) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert {t["name"] for t in report["targets"] if t["source"] == "user"} == {"mud", "juice"}
+
+
+def test_coordinates_may_be_negative(capsys):
+    house = str(real_model("houses/SampleHouse4.ifc"))
+    arguments = ["run", house, "--cell", "0.1", "--start", "-3,2", "--target", "spill@-1.5,1", "--json"]
+    assert main(arguments) == 0
+    assert json.loads(capsys.readouterr().out)["start"]["point"][:2] == [-3.0, 2.0]
+
+
+def test_some_targets_unreached_is_exit_code_three(capsys):
+    duplex = str(real_model("duplex/Duplex_A_20110907.ifc"))
+    here, there = "here@3,-2,Level 1", "there@3,-15,Level 1"
+    arguments = [
+        "run",
+        duplex,
+        "--cell",
+        "0.1",
+        "--start",
+        "3,-3,Level 1",
+        "--target",
+        here,
+        "--target",
+        there,
+        "--json",
+    ]
+    assert main(arguments) == 3
+    reached = {t["name"]: t["reached"] for t in json.loads(capsys.readouterr().out)["targets"]}
+    assert reached == {"here": True, "there": False}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["run", "no/such.ifc"], "no/such.ifc"),
+        (["run", "."], "folder"),
+        (["run", APARTMENT, "--task", "clean"], "cleaning"),
+        (["run", APARTMENT, "--cell", "0"], "cell size is 0"),
+        (["run", APARTMENT, "--cell", "-1"], "cell size is -1"),
+        (["run", APARTMENT, "--cell", "nan"], "not a length"),
+        (["run", APARTMENT, "--cell", "0.5mm"], "at least"),
+        (["run", APARTMENT, "--start", "99,99"], "no floor"),
+        (["run", APARTMENT, "--start", "2.8,17.9"], "Round Table"),
+        (["run", APARTMENT, "--start", "1,14,Attic"], "Ground Floor"),
+        (["run", APARTMENT, "--target", "spill@99,99"], "spill"),
+        (["run", APARTMENT, "--target", "spill"], "NAME@X,Y"),
+        (["run", APARTMENT, "--targets", "none.csv"], "none.csv"),
+        (["run", APARTMENT, "--radius", "-1"], "radius"),
+        (["run", APARTMENT, "--radius", "3"], "Use a smaller robot"),
+        (["run", APARTMENT, "--connectivity", "5"], "choose from"),
+        (["run"], "MODEL"),
+        (["walk"], "invalid choice"),
+        (["inspect", "no/such.ifc"], "no/such.ifc"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_two(arguments, says, capsys):
+    try:
+        code = main(arguments)
+    except SystemExit as exit_:
+        code = exit_.code
+    printed = capsys.readouterr()
+    assert code == 2
+    assert printed.out == ""
+    assert len(printed.err.strip().splitlines()) == 1
+    assert says in printed.err
+
+
+def test_an_out_folder_that_is_a_file_is_refused(capsys, tmp_path):
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    assert main(["run", APARTMENT, "--out", str(taken)]) == 2
+    assert "taken" in capsys.readouterr().err
+    assert taken.read_text() == "mine"
+
+
+def test_inspect_accounts_for_every_product(capsys):
+    assert main(["inspect", APARTMENT, "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    ledger = report["ledger"]
+    assert set(ledger) == {"asked", "footprinted", "outside_bands", "left_out", "lost"}
+    assert ledger["asked"] == sum(count for name, count in ledger.items() if name != "asked") > 0
+    (storey,) = report["storeys"]
+    assert (storey["spaces"], storey["doors"]) == (5, 6)
+    assert main(["inspect", APARTMENT]) == 0
+    assert "Ground Floor" in capsys.readouterr().out
+
+
+def test_tasks_are_listed(capsys):
+    assert main(["tasks", "list"]) == 0
+    assert "cleaning" in capsys.readouterr().out
+    assert main(["tasks", "list", "--json"]) == 0
+    assert "cleaning" in {task["name"] for task in json.loads(capsys.readouterr().out)}
+
+
+def test_the_doctor_finds_the_installation_well(capsys):
+    assert main(["doctor", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ok"]
+
+
+def test_importing_bimnav_loads_nothing_heavy():
+    heavy = [
+        "numpy",
+        "scipy",
+        "shapely",
+        "ifcopenshell",
+        "numba",
+        "matplotlib",
+        "manifold3d",
+        "fcl",
+        "simpy",
+        "pydantic",
+    ]
+    script = f"import sys, bimnav; print([m for m in {heavy} if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_the_public_names_are_the_same_for_programs_and_type_checkers():
+    import ast
+    from pathlib import Path
+
+    tree = ast.parse(Path(bn.__file__).read_text())
+    (block,) = (n for n in tree.body if isinstance(n, ast.If))
+    static = {alias.name: node.module for node in block.body for alias in node.names}
+    assert static == bn._HOME
+    for name in bn.__all__:
+        assert getattr(bn, name) is not None
