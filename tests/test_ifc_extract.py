@@ -426,6 +426,17 @@ def test_a_body_of_which_one_part_fails_is_read_and_listed():
     assert_ledger_closes(building)
 
 
+def test_a_damaged_representation_costs_its_own_product_only():
+    sketch = Sketch()
+    wall, broken = sketch.wall(), sketch.wall()
+    sketch.make("IfcMappedItem")  # without a source
+    broken.Representation.Representations[0].Items = [sketch.file.by_type("IfcMappedItem")[0]]
+    building = sketch.read()
+    assert building.ledger.read == (wall.GlobalId,)
+    assert "refers to nothing" in building.ledger.lost[broken.GlobalId]
+    assert_ledger_closes(building)
+
+
 def test_the_heartbeat_names_every_product_before_it_is_touched_and_crashed_ones_are_skipped():
     sketch = Sketch()
     walls = [sketch.wall(at=(x, 0, 0)) for x in range(4)]
@@ -519,7 +530,8 @@ def test_furniture_in_a_room_belongs_to_the_storey_of_the_room():
     room = sketch.add("IfcSpace", sketch.box((4, 4, 2.5)), Name="1", LongName="Living room")
     sketch.whole(sketch.storeys[0], room)
     sofa = sketch.add("IfcFurniture", sketch.box((2, 1, 1)), within=room)
-    lost = sketch.add("IfcFurniture", sketch.box((2, 1, 1)), within=sketch.building)
+    lost = sketch.add("IfcFurniture", sketch.box((2, 1, 1)))
+    sketch.whole(sketch.building, lost)
     building = sketch.read()
     read = building[sofa.GlobalId]
     assert (read.space, read.storey, read.parent) == (room.GlobalId, sketch.storeys[0].GlobalId, None)
@@ -527,6 +539,7 @@ def test_furniture_in_a_room_belongs_to_the_storey_of_the_room():
     assert building.spaces[0].bounds[1] == pytest.approx([4, 4, 2.5])
     assert room.GlobalId not in building
     assert issue(building, "outside-storeys").global_ids == (lost.GlobalId,)
+    assert building[lost.GlobalId].parent is None  # a building is no element
 
 
 def test_storeys_that_hold_nothing_or_are_only_levels_are_named():

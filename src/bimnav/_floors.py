@@ -48,16 +48,23 @@ class Floor:
 
 def find_floors(building: Building, robot: Robot) -> tuple[tuple[Floor, ...], tuple[Issue, ...]]:
     """Find every storey's floor: from its spaces, else its slabs, else the hull of its walls."""
-    floors: list[Floor] = []
-    guessed: list[str] = []
-    for index, storey in enumerate(building.storeys):
-        layers = _space_floors(building, index, robot) or _slab_floors(building, storey)
-        if not layers:
-            layers = _hull_floors(building, storey)
-            guessed += [storey.global_id for _ in layers]
-        floors += layers or [Floor(storey, storey.elevation)]
-    floors.sort(key=lambda floor: floor.level)
+    layers = [
+        _space_floors(building, index, robot) or _slab_floors(building, storey)
+        for index, storey in enumerate(building.storeys)
+    ]
     doorways = list(_doorways(building))
+    guessed = []
+    for index, storey in enumerate(building.storeys):
+        has_door = any(abs(sill - storey.elevation) <= NEAR for _, sill in doorways)
+        if not layers[index] and (has_door or not any(layers)):
+            layers[index] = _hull_floors(building, storey)
+            guessed += [storey.global_id for _ in layers[index]]
+    floors = [
+        floor
+        for index, storey in enumerate(building.storeys)
+        for floor in layers[index] or [Floor(storey, storey.elevation)]
+    ]
+    floors.sort(key=lambda floor: floor.level)
     for k, floor in enumerate(floors):
         lowest, highest = floor.level - NEAR, floor.level + robot.step_height
         own = tuple(piece for piece, sill in doorways if floor.pieces and lowest <= sill <= highest)

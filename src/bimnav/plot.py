@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from bimnav.errors import ValueRangeError
@@ -135,6 +136,12 @@ def _draw_elements(ax: Axes, environment: IndoorEnvironment, storey: int) -> lis
         _patches(others, facecolor=_COLORS["furniture"], edgecolor="#6b6459", linewidth=0.5, alpha=0.75, zorder=3)
     )
     ax.add_collection(_patches(walls, facecolor=_COLORS["wall"], edgecolor="none", zorder=3))
+    for region in environment.regions:
+        if region.storey == storey and region.source == "space":
+            x, y = region.polygon.representative_point().coords[0]
+            name = ax.text(x, y, region.name, color="#6f6a5d", fontsize=6.5, style="italic", ha="center", zorder=4)
+            name.set_clip_on(True)
+            name.set_path_effects([withStroke(linewidth=2, foreground="white")])
     key = [Patch(color=_COLORS["wall"], label="wall, window, column")]
     if others:
         key.append(Patch(facecolor=_COLORS["furniture"], edgecolor="#6b6459", label="other obstacle"))

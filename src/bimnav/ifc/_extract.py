@@ -15,7 +15,8 @@ from bimnav.ifc._findings import Findings
 from bimnav.ifc._geometry import Geometry, read_geometry
 from bimnav.ifc._kernel import Entity, File
 from bimnav.ifc._model import Model, to_building
-from bimnav.ifc._products import BodyFinder, Relations, identify, left_out_by_class, open_circles, sanitize, sorted_of
+from bimnav.ifc._products import BodyFinder, identify, left_out_by_class, sanitize, sorted_of
+from bimnav.ifc._relations import Relations, open_circles
 from bimnav.ifc._semantics import Rows, derived_storey, lowest_floor, storey_rows, text_of
 from bimnav.ifc._units import length_unit
 
@@ -24,6 +25,7 @@ __all__ = ["Heartbeat", "extract", "to_building"]
 Heartbeat = Callable[[int, int, str], None]
 
 _CRASHED = "it crashed the geometry kernel"
+_DAMAGED = "its representation refers to nothing, or to something else than a shape"
 
 
 def _silent(done: int, total: int, global_id: str) -> None:
@@ -66,12 +68,13 @@ def extract(
     ids, renamed = identify(products)
     relations = Relations.of(file)
     findings = Findings(ids)
-    findings.about_file(renamed, sanitize(products), open_circles(file, relations.circular), log)
+    taken_out = [step_id for step_id in open_circles(file, relations.circular) if step_id in ids]
+    findings.about_file(renamed, sanitize(products), taken_out, log)
 
     asked = [product for product in products if product.Representation]
     no_part = left_out_by_class(file)
-    solids, contexts, left_out = _sort_out(asked, no_part)
-    lost = {p.id(): _CRASHED for p in asked if p.id() in solids and ids[p.id()] in skip}
+    solids, contexts, left_out, lost = _sort_out(asked, no_part)
+    lost |= {step_id: _CRASHED for step_id in solids if ids[step_id] in skip}
     wanted = [product for product in asked if product.id() in solids and product.id() not in lost]
     begun: set[int] = set()
 
@@ -104,21 +107,26 @@ def extract(
 
 def _sort_out(
     asked: Sequence[Entity], no_part: Mapping[int, str]
-) -> tuple[dict[int, list[Entity]], set[int], dict[int, str]]:
-    """Find the solids of each product, the contexts they are in, and the products to leave out, with the rule."""
+) -> tuple[dict[int, list[Entity]], set[int], dict[int, str], dict[int, str]]:
+    """Find the solids of each product, their contexts, and which products to leave out or give up, and why."""
     finder = BodyFinder()
     solids: dict[int, list[Entity]] = {}
     contexts: set[int] = set()
     left_out: dict[int, str] = {}
+    lost: dict[int, str] = {}
     for product in asked:
         step_id = product.id()
-        own, where = ([], set()) if step_id in no_part else finder.solids_of(product)
+        try:
+            own, where = ([], set()) if step_id in no_part else finder.solids_of(product)
+        except (AttributeError, RuntimeError, TypeError):
+            lost[step_id] = _DAMAGED
+            continue
         if own:
             solids[step_id] = own
             contexts |= where
         else:
             left_out[step_id] = no_part.get(step_id, "no-body")
-    return solids, contexts, left_out
+    return solids, contexts, left_out, lost
 
 
 def _contents(

@@ -13,7 +13,8 @@ from ifcopenshell.util.placement import get_local_placement
 from numpy.typing import NDArray
 
 from bimnav.ifc._kernel import Entity, File
-from bimnav.ifc._products import Relations, derived_id, sorted_of
+from bimnav.ifc._products import derived_id, sorted_of
+from bimnav.ifc._relations import Relations
 
 __all__ = ["Rows", "storey_rows", "text_of"]
 
@@ -106,6 +107,7 @@ class Rows:
         self._shapes = shapes
         self._unit_scale = unit_scale
         self._storeys = {storey.id() for storey in sorted_of(file, "IfcBuildingStorey")}
+        self._spatial = {each.id() for each in sorted_of(file, "IfcSpatialElement", "IfcSpatialStructureElement")}
         self._spaces = {space.id() for space in sorted_of(file, "IfcSpace")}
         self._fillings: dict[int, list[int]] = defaultdict(list)
         for filling, opening in sorted(relations.fills.items()):
@@ -126,7 +128,7 @@ class Rows:
             "tag": text_of(getattr(product, "Tag", None)),
             "storey": self._nearest(step_id, self._storeys),
             "space": self._nearest(step_id, self._spaces),
-            "parent": None if whole in self._storeys | self._spaces else self._ids.get(whole or 0),
+            "parent": None if whole in self._spatial else self._ids.get(whole or 0),
             "step_id": step_id,
             "shapes": self._shapes(step_id),
         }

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bimnav.search.compiled import FOUND, FULL, NOTHING, first_at_least, lean, pop_least, push
+from bimnav.search.compiled import FOUND, FULL, NOTHING, first_at_least, lean, pop_least, put
 from bimnav.search.layout import COL_STEP, HUB, ROW_STEP
 
 __all__ = ["astar"]
@@ -70,12 +70,16 @@ def astar(
         node = nodes[source]
         node.stamp, node.length, node.parent, node.todo = stamp, 0.0, source, 0
         to_go = _to_go(source // stride % height - goal_row, source % stride - goal_col, factor, saved)
-        size = push(keys, items, size, to_go, source)
-    while size:
+        size = put(keys, items, size, to_go, source)
+    while True:
+        if size < 0:
+            size = pop_least(keys, items, -size, np.inf)
+        if size == 0:
+            return NOTHING, 0
         if size == len(keys):
             return FULL, size
         cell = np.int64(items[0])
-        size = pop_least(keys, items, size, np.inf)
+        size = -size  # the best of what is put next often belongs to the top
         node = nodes[cell]
         if node.todo == _CLOSED:
             continue
@@ -86,7 +90,7 @@ def astar(
                 break
             settled += 1
             if settled == len(targets):
-                return FOUND, size
+                return FOUND, abs(size)
         row, col = cell // stride % height - goal_row, cell % stride - goal_col
         so_far, here, m = node.length, np.float64(cost[cell]), np.int64(moves[cell])
         for way in range(ways):
@@ -98,7 +102,7 @@ def astar(
             if other.stamp != stamp or length < other.length:
                 other.stamp, other.length, other.parent, other.todo = stamp, length, cell, 0
                 to_go = _to_go(row + ROW_STEP[way], col + COL_STEP[way], factor, saved)
-                size = push(keys, items, size, length + to_go, end)
+                size = put(keys, items, size, length + to_go, end)
         if m & HUB:
             for k in range(first_at_least(link_from, cell), len(link_from)):
                 if link_from[k] != cell:
@@ -109,5 +113,4 @@ def astar(
                 if other.stamp != stamp or length < other.length:
                     other.stamp, other.length, other.parent, other.todo = stamp, length, ~cell, 0
                     to_go = _to_go(end // stride % height - goal_row, end % stride - goal_col, factor, saved)
-                    size = push(keys, items, size, length + to_go, end)
-    return NOTHING, size
+                    size = put(keys, items, size, length + to_go, end)

@@ -22,6 +22,7 @@ __all__ = [
     "lean",
     "pop_least",
     "push",
+    "put",
     "trailing_zeros",
 ]
 
@@ -87,6 +88,28 @@ NEVER = 0x7FF0_0000_0000_0000
 
 
 @lean
+def _sink(keys: NDArray[Any], items: NDArray[np.int32], size: int, key: Any, item: int) -> None:
+    """Put an entry in place of the top of a heap, and down to where it belongs."""
+    at = 0
+    while True:
+        least = 4 * at + 1
+        if least >= size:
+            break
+        # beyond the end lie keys that are never least
+        right = least + 2 + (keys[least + 3] < keys[least + 2])
+        least += keys[least + 1] < keys[least]
+        if keys[right] < keys[least]:
+            least = right
+        if keys[least] >= key:
+            break
+        keys[at] = keys[least]
+        items[at] = items[least]
+        at = least
+    keys[at] = key
+    items[at] = item
+
+
+@lean
 def push(keys: NDArray[Any], items: NDArray[np.int32], size: int, key: Any, item: int) -> int:
     """Add to a heap of `size` entries with four children each; return its new size.
 
@@ -109,29 +132,19 @@ def push(keys: NDArray[Any], items: NDArray[np.int32], size: int, key: Any, item
 
 @lean
 def pop_least(keys: NDArray[Any], items: NDArray[np.int32], size: int, never: Any) -> int:
-    """Take the least entry, at 0, off a heap of `size` entries; return its new size.
-
-    Keys from `size` on are `never`, which spares asking which children there are.
-    """
+    """Take the least entry, at 0, off a heap of `size` entries; return its new size."""
     size -= 1
     key, item = keys[size], items[size]
     keys[size] = never
-    if size == 0:
-        return 0
-    at = 0
-    while True:
-        least = 4 * at + 1
-        if least >= size:
-            break
-        right = least + 2 + (keys[least + 3] < keys[least + 2])
-        least += keys[least + 1] < keys[least]
-        if keys[right] < keys[least]:
-            least = right
-        if keys[least] >= key:
-            break
-        keys[at] = keys[least]
-        items[at] = items[least]
-        at = least
-    keys[at] = key
-    items[at] = item
+    if size:
+        _sink(keys, items, size, key, item)
     return size
+
+
+@lean
+def put(keys: NDArray[Any], items: NDArray[np.int32], size: int, key: Any, item: int) -> int:
+    """Add to a heap as `push` does; where `size` is negative, in place of its top, which was dealt with."""
+    if size >= 0:
+        return push(keys, items, size, key, item)
+    _sink(keys, items, -size, key, item)
+    return -size

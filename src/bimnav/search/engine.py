@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
@@ -20,6 +21,7 @@ from bimnav.search.workspace import Workspace, workspace
 __all__ = ["Found", "distances", "distances_between", "find"]
 
 _TOWARD_GOAL = 1 + 2**-40  # among equal sums take what is nearer to the goal; far below any true difference
+_ROOT = math.sqrt(2)
 _NONE = np.zeros(0, dtype=np.int64)
 
 
@@ -55,7 +57,7 @@ def find(
     if not found:
         return None
     indices, straight, diagonal, linked = trace(space.units, layout.height, layout.stride, *layout.links, goal)
-    plan = straight + diagonal * np.sqrt(2)
+    plan = straight + diagonal * _ROOT
     cost = layout.least * plan + linked if layout.is_uniform else float(space.costs["length"][goal])
     return Found(indices, float(plan + linked), float(cost))
 
@@ -97,43 +99,35 @@ def distances_between(layout: Layout, cells: NDArray[np.int64], scale: float) ->
 
 
 def _jump(space: Workspace, layout: Layout, start: int, goal: int) -> bool:
-    shrink = int(layout.shrink * WHOLE)
+    arguments, shrink = layout.jump_arguments, int(layout.shrink * WHOLE)
     return _retry(
         space,
         layout,
-        lambda stamp: jump(
-            layout.moves, layout.turns, layout.stops, layout.first_stop, layout.height, layout.stride,
-            *layout.uniform_links, start, goal, shrink, space.units, space.keys, space.items, stamp,
-        ),
-    )  # fmt: skip
+        lambda stamp: jump(*arguments, start, goal, shrink, space.units, space.keys, space.items, stamp),
+    )
 
 
 def _astar(
     space: Workspace, layout: Layout, sources: NDArray[np.int64], targets: NDArray[np.int64], factor: float
 ) -> bool:
-    steps = layout.steps[: layout.connectivity]
+    arguments = layout.astar_arguments
     return _retry(
         space,
         layout,
-        lambda stamp: astar(
-            layout.cost, layout.moves, steps, layout.height, layout.stride, *layout.links,
-            sources, targets, factor, space.costs, space.float_keys, space.items, stamp,
-        ),
-    )  # fmt: skip
+        lambda stamp: astar(*arguments, sources, targets, factor, space.costs, space.float_keys, space.items, stamp),
+    )
 
 
 def _spread(
     space: Workspace, layout: Layout, sources: NDArray[np.int64], targets: NDArray[np.int64]
 ) -> NDArray[np.int64]:
+    arguments = layout.spread_arguments
     reach, arrivals = space.lengths(layout.moves.size)
     _retry(
         space,
         layout,
-        lambda _: spread(
-            layout.moves, layout.turns, layout.steps, layout.covered, *layout.uniform_links,
-            sources, targets, reach, arrivals, space.keys, space.items,
-        ),
-    )  # fmt: skip
+        lambda _: spread(*arguments, sources, targets, reach, arrivals, space.keys, space.items),
+    )
     return reach
 
 

@@ -110,7 +110,7 @@ def spread(
         while settled < len(targets) and reach[targets[settled]] <= length:
             settled += 1
         if settled and settled == len(targets):
-            break
+            return FOUND, size
         m = np.int64(moves[cell])
         if m & HUB:
             for k in range(first_at_least(link_from, cell), len(link_from)):
@@ -151,7 +151,7 @@ def spread(
                             moves, turns, steps[side], side, covered[side], reach, arrivals, keys, items,
                             size, at, so_far,
                         )  # fmt: skip
-    return FOUND, size
+    return FOUND, 0
 
 
 @kernel

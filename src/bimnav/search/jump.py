@@ -243,4 +243,4 @@ def jump(
                     side = last_side
                 if way < 4 or not here >> way & 1:
                     break
-    return NOTHING, size
+    return NOTHING, 0

@@ -259,3 +259,20 @@ class Layout:
         words = np.zeros(self.first_stop[8], dtype=np.uint64)
         _find_stops(self.moves, _IS_STOP, self.stride, words, self.first_stop)
         return words
+
+    @cached_property
+    def jump_arguments(self) -> tuple[Any, ...]:
+        """What `jump` wants to know of the map."""
+        map_ = self.moves, self.turns, self.stops, self.first_stop, self.height, self.stride
+        return *map_, *self.uniform_links
+
+    @cached_property
+    def astar_arguments(self) -> tuple[Any, ...]:
+        """What `astar` wants to know of the map."""
+        steps = self.steps[: self.connectivity]
+        return self.cost, self.moves, steps, self.height, self.stride, *self.links
+
+    @cached_property
+    def spread_arguments(self) -> tuple[Any, ...]:
+        """What `spread` wants to know of the map."""
+        return self.moves, self.turns, self.steps, self.covered, *self.uniform_links

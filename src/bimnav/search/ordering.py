@@ -82,24 +82,22 @@ def _order_symmetric(
     closed: bool,
     time_limit: float | None,
 ) -> Ordering:
-    bribe = 0.0  # for a round trip that goes from the end straight to the start; more than any change saves
-    last = end
-    if not closed:
-        bribe = 3 * float(cost.max())
-        if last is None:
-            last = len(cost)
-            cost = np.pad(cost, (0, 1))
-        cost[start, last] = cost[last, start] = -bribe
+    if closed:
+        order, cut_short = _improve(cost, True, time_limit)
+        order = np.roll(order, -int(np.flatnonzero(order == start)[0]))
+        return Ordering(order, one_tree_bound(cost, _rounds(cost)), cut_short)
+    last = len(cost) if end is None else end
+    if end is None:
+        cost = np.pad(cost, (0, 1))  # a row that costs nothing to go to, after the real last one
+    bribe = 3 * float(cost.max())  # for a round trip that goes from its last row straight to the start
+    cost[start, last] = cost[last, start] = -bribe
     order, cut_short = _improve(cost, True, time_limit)
     order = np.roll(order, -int(np.flatnonzero(order == start)[0]))
-    if not closed:
-        if order[1] == last:
-            order = np.roll(order[::-1], 1)
-        if end is None:
-            order = order[:-1]
-        cost = np.roll(cost, -last, axis=(0, 1))  # the bound treats row 0 apart
+    if order[1] == last:
+        order = np.roll(order[::-1], 1)
+    cost = np.roll(cost, -last, axis=(0, 1))  # the bound is tighter when row 0 is the one with the bribe
     bound = one_tree_bound(cost, _rounds(cost)) + bribe
-    return Ordering(order, bound, cut_short)
+    return Ordering(order[:-1] if end is None else order, bound, cut_short)
 
 
 def _improve(cost: NDArray[np.float64], is_symmetric: bool, time_limit: float | None) -> tuple[NDArray[np.intp], bool]:

@@ -15,7 +15,7 @@ def warmup() -> None:
     """Compile every kernel, or load it from its cache, by using each once on something tiny."""
     cost = np.ones((1, 3, 3), dtype=np.float32)
     cells = np.array([0, 8])
-    for multipliers in (cost, cost + np.arange(3, dtype=np.float32)):
+    for multipliers in (cost, cost + np.arange(3).astype(np.float32)):
         layout = Layout(multipliers)
         find(layout, 0, 8)
         distances(layout, cells, 1.0)
