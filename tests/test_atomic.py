@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from bimnav import _files as _atomic
+from bimnav._files import write_bytes, write_text
 from bimnav.errors import OutputError
-from bimnav.export import _atomic
-from bimnav.export._atomic import write_bytes, write_text
 
 
 def names(folder: Path) -> list[str]:
@@ -136,7 +136,7 @@ def test_temporary_files_of_killed_programs_are_swept_and_those_of_others_kept(t
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(tmp_path: Path):
     path = tmp_path / "file"
     script = (
-        "import sys; from bimnav.export._atomic import write_bytes\n"
+        "import sys; from bimnav._files import write_bytes\n"
         "while True:\n    for byte in (b'a', b'b'): write_bytes(sys.argv[1], byte * 200_000)"
     )
     for _ in range(4):

@@ -74,7 +74,7 @@ def with_units(*units: str) -> str:
         (b"<html><body>404</body></html>", "web page"),
         (b"%PDF-1.7 ...", "PDF"),
         (b"\x89PNG\r\n\x1a\n", "PNG"),
-        (gzip.compress(b"ISO-10303-21;"), "gzip"),
+        (gzip.compress(b"ISO-10303-21;", mtime=0), "gzip"),
         (model().encode("utf-16"), "UTF-16"),
         (b'{"type": "ifcJSON"}', "JSON"),
         (b"SQLite format 3\0", "SQLite"),

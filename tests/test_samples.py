@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import os
 import runpy
+import subprocess
+import sys
+import zipfile
 from collections import deque
 from functools import cache
 from pathlib import Path
@@ -20,6 +24,7 @@ import shapely
 
 from bimnav.errors import InputError
 from bimnav.samples import list_samples, sample
+from tests.conftest import REPOSITORY
 
 FOOT = 0.3048
 BAND = 0.05, 1.0  # metres above the floor, where a robot's body is
@@ -297,3 +302,20 @@ def test_the_ways_between_targets_bend_around_furniture():
 
 def test_the_upper_cabinets_hang_above_the_robot():
     assert not any(name.startswith("Upper Cabinet:") for name in obstacles("apartment"))
+
+
+def test_the_wheel_brings_the_samples(tmp_path):
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(tmp_path), str(REPOSITORY)]
+    subprocess.run(build, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "installed")
+    ask = "import bimnav as bn; print(bn.sample('apartment').is_relative_to('.'), bn.sample('apartment').exists())"
+    found = subprocess.run(
+        [sys.executable, "-P", "-c", ask.replace("'.'", repr(str(tmp_path)))],
+        check=True,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "installed")},
+    )
+    assert found.stdout == "True True\n"

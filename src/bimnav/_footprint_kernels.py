@@ -133,7 +133,7 @@ def orient(
     Parameters
     ----------
     vertices : (n, 3) float64, about the origin
-    faces : (m, 3) int32, no vertex twice in a face
+    faces : (m, 3) int32
     order, begins
         From `join`.
 
@@ -345,7 +345,12 @@ def trace(
                     apart = math.hypot(hull[i, 0] - hull[k, 0], hull[i, 1] - hull[k, 1])
                     if apart > length:
                         p, q, length = i, k, apart
-            if abs(twice) <= thin * length:
+            longest = max(
+                math.hypot(b[0] - a[0], b[1] - a[1]),
+                math.hypot(c[0] - b[0], c[1] - b[1]),
+                math.hypot(a[0] - c[0], a[1] - c[1]),
+            )
+            if abs(twice) <= thin * longest:
                 lines[line_count, 0], lines[line_count, 1] = hull[p], hull[q]
                 line_count += 1
     for edge in range(edge_count):

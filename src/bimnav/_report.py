@@ -120,7 +120,7 @@ def _targets(mission: Mission) -> list[dict[str, Any]]:
 
 def write_mission(mission: Mission, folder: Path) -> Mission:
     """Write figures, tables and the report of a mission into a folder."""
-    from bimnav.export._atomic import write_bytes, write_text
+    from bimnav._files import write_bytes, write_text
     from bimnav.plot import save_tour
     from bimnav.sim.log import csv_text
 

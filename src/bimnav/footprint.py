@@ -244,8 +244,8 @@ def footprints_of(shapes: Sequence[Shape], low: ArrayLike, high: ArrayLike) -> l
     ValueRangeError
         If a `low` is not below its `high`.
     """
-    heights = (np.broadcast_to(np.asarray(height, dtype=np.float64), len(shapes)) for height in (low, high))
-    asked = np.stack(list(heights), axis=1)
+    asked = np.empty((len(shapes), 2))
+    asked[:, 0], asked[:, 1] = low, high
     if not (asked[:, 0] < asked[:, 1]).all():
         raise ValueRangeError("a height band is empty or not a number.", "Give a low below a high, in metres.")
     touch = np.minimum(_TOUCH, (asked[:, 1] - asked[:, 0]) / 4)
@@ -258,22 +258,21 @@ def footprints_of(shapes: Sequence[Shape], low: ArrayLike, high: ArrayLike) -> l
     local = np.sort(np.round((bands[near] - frames.shift[:, 2:]) / frames.scale, 9), axis=1)
 
     covers: dict[tuple[object, ...], _Cover | None] = {}
-    inside: list[tuple[int, _Cover]] = []
-    for n, fabric in enumerate(woven):
-        task = (id(fabric), *local[n].tolist(), frames.turn[n].tobytes())
-        if task not in covers:
-            turned = fabric if frames.is_upright[n] else fabric._replace(vertices=fabric.vertices @ frames.turn[n].T)
-            covers[task] = _cover(turned, *local[n])
-        if (cover := covers[task]) is not None:
-            inside.append((n, cover))
-    found: list[Footprint | None] = [None] * len(shapes)
-    which = [n for n, _ in inside]
+    tasks = []
+    for fabric, turn, upright, (bottom, top) in zip(woven, frames.turn, frames.is_upright, local.tolist(), strict=True):
+        tasks.append((id(fabric), bottom, top, turn.tobytes()))
+        if tasks[-1] not in covers:
+            turned = fabric if upright else fabric._replace(vertices=fabric.vertices @ turn.T)
+            covers[tasks[-1]] = _cover(turned, bottom, top)
+    inside = [(n, cover) for n, task in enumerate(tasks) if (cover := covers[task]) is not None]
+    which, chosen = [n for n, _ in inside], [near[n] for n, _ in inside]
+    heights = np.array([(cover.low, cover.high) for _, cover in inside]).reshape(-1, 2)
+    heights = np.sort(heights * frames.scale[which] + frames.shift[which, 2:], axis=1)
+    heights = np.where(np.abs(heights - bands[chosen]) <= _SLACK, asked[chosen], heights)
     polygons = _placed([cover.polygon for _, cover in inside], frames.plan[which], frames.shift[which, :2])
-    for (n, cover), polygon in zip(inside, polygons, strict=True):
-        ends = sorted(z * float(frames.scale[n, 0]) + float(frames.shift[n, 2]) for z in (cover.low, cover.high))
-        cut = np.abs(ends - bands[near[n]]) <= _SLACK
-        bottom, top = np.where(cut, asked[near[n]], ends).tolist()
-        found[near[n]] = Footprint(polygon, bottom, top, woven[n].quality)
+    found: list[Footprint | None] = [None] * len(shapes)
+    for i, n, polygon, (bottom, top) in zip(chosen, which, polygons, heights.tolist(), strict=True):
+        found[i] = Footprint(polygon, bottom, top, woven[n].quality)
     return found
 
 
@@ -318,29 +317,30 @@ def _cover(fabric: _Fabric, low: float, high: float) -> _Cover | None:
     region = manifold3d.CrossSection()
     outlines = list(zip(pairwise(begins.tolist()), bounds.tolist(), strict=True))
     for kind in (LOW, HIGH, COVER):
-        region += _region_of([points[first:last] for (first, last), bound in outlines if bound == kind])
+        if rings := [points[first:last] for (first, last), bound in outlines if bound == kind]:
+            region += _region_of(rings)
     if region.area() < _SPECK:
         lines = trace(*net, np.ones_like(is_sheet), low, high, _ANY_WIDTH)[3]
     polygon = _polygon_of(region)
-    if len(lines):
-        polygon = _polygon_of(region + _region_of(_bare(lines, polygon)))
+    if len(lines) and len(bare := _bare(lines, _valid(polygon))):
+        polygon = _polygon_of(region + _region_of(list(bare)))
     elif not is_sheet.any() and any(turns_back(ring, 2 * _FIN) for ring in region.to_polygons()):
-        polygon = _without_fins(polygon)
+        polygon = _without_fins(_valid(polygon))
     return _Cover(polygon, lowest, highest)
 
 
-def _region_of(rings: Sequence[NDArray[np.float64]] | NDArray[np.float64]) -> manifold3d.CrossSection:
+def _region_of(rings: Sequence[NDArray[np.float64]]) -> manifold3d.CrossSection:
     """Return all that rings go round, either way round."""
-    return manifold3d.CrossSection(rings, manifold3d.FillRule.NonZero) if len(rings) else manifold3d.CrossSection()
+    return manifold3d.CrossSection(rings, manifold3d.FillRule.NonZero)
 
 
 def _polygon_of(region: manifold3d.CrossSection) -> BaseGeometry:
-    """Return a region as a valid Polygon or MultiPolygon."""
+    """Return a region as Polygon or MultiPolygon, which may touch itself."""
     region = region.simplify(_ROUNDING)
     parts = [region] if region.num_contour() < 2 else region.decompose()
     contours = [rings for part in parts if (rings := part.to_polygons())]
     polygons = [shapely.Polygon(shell, holes) for shell, *holes in contours]
-    return _valid(polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons))
+    return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
 
 
 def _valid(polygon: BaseGeometry) -> BaseGeometry:
@@ -349,11 +349,9 @@ def _valid(polygon: BaseGeometry) -> BaseGeometry:
         return polygon
     pieces = shapely.get_parts(shapely.make_valid(shapely.get_parts(polygon)))
     pieces = shapely.get_parts(pieces)  # collections inside collections
-    farthest = float(np.abs(polygon.bounds).max())
-    return shapely.union_all(
-        pieces[shapely.get_type_id(pieces) == shapely.GeometryType.POLYGON],
-        grid_size=max(_ROUNDING / 10, farthest * 1e-15),
-    )
+    pieces = pieces[shapely.get_type_id(pieces) == shapely.GeometryType.POLYGON]
+    finest = float(np.abs(polygon.bounds).max()) * 1e-15
+    return shapely.union_all(pieces, grid_size=max(_ROUNDING / 10, finest))
 
 
 def _bare(lines: NDArray[np.float64], polygon: BaseGeometry) -> NDArray[np.float64]:
@@ -380,11 +378,13 @@ def _without_fins(polygon: BaseGeometry) -> BaseGeometry:
 def _placed(
     polygons: Sequence[BaseGeometry], plan: NDArray[np.float64], shift: NDArray[np.float64]
 ) -> list[BaseGeometry]:
-    """Put n polygons in their places, (n, 2, 2) and (n, 2)."""
+    """Put n polygons in their places, (n, 2, 2) and (n, 2), and make them valid."""
     placed = np.array(polygons, dtype=object)
     points, owner = shapely.get_coordinates(placed, return_index=True)
     shapely.set_coordinates(placed, np.einsum("nij,nj->ni", plan[owner], points) + shift[owner])
-    return [_valid(polygon) for polygon in placed]
+    for n in np.flatnonzero(~shapely.is_valid(placed)):
+        placed[n] = _valid(placed[n])
+    return list(placed)
 
 
 def unite(polygons: Iterable[BaseGeometry]) -> BaseGeometry:

@@ -17,7 +17,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from bimnav.errors import GridError, NothingWalkableError, OutsideMapError, ValueRangeError
-from bimnav.grid import EROSION, Cell, GridFrame, rasterize
+from bimnav.grid import EROSION, Cell, GridFrame, cells_within, rasterize
 
 if TYPE_CHECKING:
     import networkx
@@ -404,7 +404,7 @@ def _build(
     if not len(bounds):
         raise NothingWalkableError(
             f"{environment.building.name!r} has no floor that robot {environment.robot.name!r} could stand on.",
-            "Use a smaller robot." if environment.regions else "It has no spaces, slabs or walls to stand between.",
+            "Use a smaller robot." if environment.regions else "No space, slab or wall of it has a shape.",
         )
     frame = GridFrame.covering(
         (*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0)),
@@ -418,7 +418,7 @@ def _build(
     for storey, floor in enumerate(floors):
         if floor.is_empty:
             continue
-        walkable[storey] = ~rasterize(frame, _complement(frame, floor))
+        walkable[storey] = cells_within(frame, floor)
         obstacle[storey] = rasterize(frame, [body for _, body in environment.bodies_on(storey)])
         for zone in environment.zones:
             if zone.storey == storey:
@@ -431,12 +431,6 @@ def _build(
         for conflict in conflicts:
             cost[conflict.cell] = 1
     return NavGraph(frame, cost, obstacle, walkable, connectivity, environment, targets, conflicts, on_conflict)
-
-
-def _complement(frame: GridFrame, floor: BaseGeometry) -> BaseGeometry:
-    x_min, y_min, x_max, y_max = frame.bounds
-    d = frame.cell_size
-    return shapely.box(x_min - d, y_min - d, x_max + d, y_max + d).difference(floor)
 
 
 def _targets_in(frame: GridFrame, environment: IndoorEnvironment) -> Iterable[tuple[Target, Cell]]:
@@ -507,22 +501,21 @@ def _standing(graph: NavGraph, target: Target, component: int | None) -> Stop | 
     walls = _walls_near(graph, target)
     for k in near.tolist():
         sight = shapely.LineString([(x, y), centers[k, :2]])
-        if walls is None or not walls.intersects(sight):
+        if not any(wall.intersects(sight) for wall in walls):
             return _standing_stop(graph, target, Cell(storey, int(rows[k]), int(cols[k])))
     return None
 
 
-def _walls_near(graph: NavGraph, target: Target) -> BaseGeometry | None:
+def _walls_near(graph: NavGraph, target: Target) -> list[BaseGeometry]:
     """Return what a robot cannot work through, but for what holds the target itself."""
     if graph.environment is None:
-        return None
+        return []
     point = shapely.Point(target.destination[:2])
-    walls = [
+    return [
         obstacle.footprint
         for obstacle in graph.environment.obstacles_on(target.storey)
         if obstacle.ifc_class in _PARTITIONS and 0 < obstacle.footprint.distance(point) <= _REACH
     ]
-    return shapely.union_all(walls) if walls else None
 
 
 def _why_not_served(graph: NavGraph, target: Target, cell: Cell) -> str:

@@ -16,7 +16,7 @@ from bimnav.errors import GridError, GridTooLargeError, OutsideMapError, ValueRa
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["CELL_LIMIT", "EROSION", "Cell", "GridFrame", "rasterize"]
+__all__ = ["CELL_LIMIT", "EROSION", "Cell", "GridFrame", "cells_within", "rasterize"]
 
 CELL_LIMIT = 50_000_000
 """The most cells a grid may have."""
@@ -259,25 +259,54 @@ def rasterize(frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometry])
     -------
     occupied : (rows, cols) bool
     """
+    touched, inside = _edges_and_insides(frame, polygons)
+    return touched | inside
+
+
+def cells_within(frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometry]) -> NDArray[np.bool_]:
+    """Find the cells of one storey that lie wholly in polygons that do not overlap.
+
+    A cell counts when the cell, eroded by `EROSION`, lies in the polygons.
+
+    Parameters
+    ----------
+    frame
+        The cells.
+    polygons
+        One geometry or several, in world coordinates.
+
+    Returns
+    -------
+    within : (rows, cols) bool
+    """
+    touched, inside = _edges_and_insides(frame, polygons)
+    return inside & ~touched
+
+
+def _edges_and_insides(
+    frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometry]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the cells whose eroded box meets an edge, and those whose middle lies inside."""
     from bimnav._raster import mark_edges, mark_inside
 
-    occupied = np.zeros((frame.rows, frame.cols), dtype=np.bool_)
+    touched = np.zeros((frame.rows, frame.cols), dtype=np.bool_)
+    inside = np.zeros_like(touched)
     single = [polygons] if isinstance(polygons, shapely.Geometry) else list(polygons)
     parts = shapely.get_parts(np.asarray(single, dtype=object))
     while len(parts) and (shapely.get_type_id(parts) >= 4).any():  # collections inside collections
         parts = shapely.get_parts(parts)
     parts = parts[~shapely.is_empty(parts)]
     if not len(parts):
-        return occupied
+        return touched, inside
     if not np.isfinite(shapely.get_coordinates(parts)).all():
         raise GridError("a polygon has corners that are not finite.")
     local = shapely.transform(parts, lambda xy: xy / frame.cell_size - (frame.first_col, frame.first_row))
-    erosion = EROSION / frame.cell_size
     areal = shapely.get_type_id(local) == 3
-    mark_edges(occupied, *_runs_of(np.concatenate([shapely.get_rings(local[areal]), local[~areal]])), erosion)
+    outlines = np.concatenate([shapely.get_rings(local[areal]), local[~areal]])
+    mark_edges(touched, *_runs_of(outlines), EROSION / frame.cell_size)
     for polygon in local[areal]:
-        mark_inside(occupied, *_runs_of(shapely.get_rings([polygon])))
-    return occupied
+        mark_inside(inside, *_runs_of(shapely.get_rings([polygon])))
+    return touched, inside
 
 
 def _runs_of(lines: NDArray[np.object_]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

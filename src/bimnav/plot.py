@@ -167,7 +167,7 @@ def plot_environment(
         Of the axes; None takes feet for models in feet, else metres.
     """
     regions = [r.polygon for r in environment.regions if r.storey == storey]
-    shown = shapely.union_all([*regions, *(o.footprint for o in environment.obstacles_on(storey))])
+    shown = shapely.geometrycollections([*regions, *(o.footprint for o in environment.obstacles_on(storey))])
     bounds = _around(shown.bounds if not shown.is_empty else (0, 0, 1, 1))
     ax = _axes(ax, bounds)
     ax.add_collection(_patches(regions, facecolor=_COLORS["floor"], edgecolor="#d0cdc4", linewidth=0.5, zorder=0))

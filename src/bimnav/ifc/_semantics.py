@@ -16,7 +16,7 @@ from bimnav.ifc._kernel import Entity, File
 from bimnav.ifc._products import derived_id, sorted_of
 from bimnav.ifc._relations import Relations
 
-__all__ = ["Rows", "storey_rows", "text_of"]
+__all__ = ["Rows", "derived_storey", "lowest_floor", "storey_rows", "text_of"]
 
 Row = dict[str, Any]
 Bounds = NDArray[np.float64]

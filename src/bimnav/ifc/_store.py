@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from bimnav.errors import CacheError, OutputError
-from bimnav.export._atomic import write_bytes
+from bimnav._files import write_bytes
 from bimnav.ifc._model import Model
 
 __all__ = ["Cache", "CacheInfo", "cache_folder", "cache_info", "clear_cache", "key_of", "pack", "unpack"]

@@ -11,7 +11,7 @@ from bimnav.building import Mesh
 from bimnav.footprint import subtract, whole
 from bimnav.ifc._tessellate import Reading
 
-__all__ = ["Cutter"]
+__all__ = ["Cutter", "Placed", "cut_all"]
 
 _DIGITS = 7  # of a metre: hosts whose openings differ by less share a mesh
 _TOUCH = 1e-6  # metres

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bimnav.search.compiled import FOUND, FULL, NOTHING, first_at_least, lean, pop_least, put
+from bimnav.search.compiled import FOUND, FULL, NOTHING, first_at_least, forget, lean, pop_least, put
 from bimnav.search.layout import COL_STEP, HUB, ROW_STEP
 
 __all__ = ["astar"]
@@ -40,7 +40,7 @@ def astar(
     keys: NDArray[np.float64],
     items: NDArray[np.int32],
     stamp: int,
-) -> tuple[int, int]:
+) -> int:
     """Search until all targets are settled; leave costs and parents in `nodes`.
 
     A step costs its length times the mean of both cells' costs. A parent that a link comes from is
@@ -59,8 +59,6 @@ def astar(
     -------
     outcome
         `FOUND`, `NOTHING` if not all targets can be reached, or `FULL` if the heap was too small.
-    size
-        Of what is left on the heap.
     """
     size, settled, ways = 0, 0, len(steps)
     saved = 2.0 - _ROOT if ways == 8 else 0.0  # by a diagonal step instead of two straight ones
@@ -75,9 +73,9 @@ def astar(
         if size < 0:
             size = pop_least(keys, items, -size, np.inf)
         if size == 0:
-            return NOTHING, 0
+            return NOTHING
         if size == len(keys):
-            return FULL, size
+            return FULL
         cell = np.int64(items[0])
         size = -size  # the best of what is put next often belongs to the top
         node = nodes[cell]
@@ -90,7 +88,8 @@ def astar(
                 break
             settled += 1
             if settled == len(targets):
-                return FOUND, abs(size)
+                forget(keys, abs(size), np.inf)
+                return FOUND
         row, col = cell // stride % height - goal_row, cell % stride - goal_col
         so_far, here, m = node.length, np.float64(cost[cell]), np.int64(moves[cell])
         for way in range(ways):

@@ -17,6 +17,7 @@ __all__ = [
     "NEVER",
     "NOTHING",
     "first_at_least",
+    "forget",
     "kernel",
     "leading_zeros",
     "lean",
@@ -145,6 +146,13 @@ def pop_least(keys: NDArray[Any], items: NDArray[np.int32], size: int, never: An
 def put(keys: NDArray[Any], items: NDArray[np.int32], size: int, key: Any, item: int) -> int:
     """Add to a heap as `push` does; where `size` is negative, in place of its top, which was dealt with."""
     if size >= 0:
-        return push(keys, items, size, key, item)
+        return push(keys, items, size, key, item)  # type: ignore[no-any-return]
     _sink(keys, items, -size, key, item)
     return -size
+
+
+@lean
+def forget(keys: NDArray[Any], size: int, never: Any) -> None:
+    """Empty a heap of so many entries."""
+    for at in range(size):
+        keys[at] = never

@@ -131,11 +131,10 @@ def _spread(
     return reach
 
 
-def _retry(space: Workspace, layout: Layout, search: Callable[[int], tuple[int, int]]) -> bool:
+def _retry(space: Workspace, layout: Layout, search: Callable[[int], int]) -> bool:
     """Search until the heap is large enough; return whether all was found."""
     while True:
-        outcome, left = search(space.begin(layout.moves.size))
-        space.empty_heap(left)
+        outcome = search(space.begin(layout.moves.size))
         if outcome != FULL:
             return outcome == FOUND
         space.grow_heap()

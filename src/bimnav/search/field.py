@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bimnav.search.compiled import FOUND, FULL, NEVER, first_at_least, kernel, lean, pop_least, push
+from bimnav.search.compiled import FOUND, FULL, NEVER, first_at_least, forget, kernel, lean, pop_least, push
 from bimnav.search.layout import HUB
 from bimnav.search.lengths import DIAGONAL, FAR, STRAIGHT, to_cells
 
@@ -72,7 +72,7 @@ def spread(
     arrivals: NDArray[np.uint8],
     keys: NDArray[np.int64],
     items: NDArray[np.int32],
-) -> tuple[int, int]:
+) -> int:
     """Find the length of the shortest path from the nearest source to every cell.
 
     Parameters
@@ -90,8 +90,6 @@ def spread(
     -------
     outcome
         `FOUND`, or `FULL` if the heap was too small.
-    size
-        Of what is left on the heap.
     """
     reach[:] = FAR
     size, settled = 0, 0
@@ -101,7 +99,7 @@ def spread(
         size = push(keys, items, size, 0, source << 4 | _BEGIN)
     while size:
         if size == len(keys):
-            return FULL, size
+            return FULL
         length, item = keys[0], np.int64(items[0])
         size = pop_least(keys, items, size, NEVER)
         cell = item >> 4
@@ -110,7 +108,8 @@ def spread(
         while settled < len(targets) and reach[targets[settled]] <= length:
             settled += 1
         if settled and settled == len(targets):
-            return FOUND, size
+            forget(keys, size, NEVER)
+            return FOUND
         m = np.int64(moves[cell])
         if m & HUB:
             for k in range(first_at_least(link_from, cell), len(link_from)):
@@ -151,7 +150,7 @@ def spread(
                             moves, turns, steps[side], side, covered[side], reach, arrivals, keys, items,
                             size, at, so_far,
                         )  # fmt: skip
-    return FOUND, 0
+    return FOUND
 
 
 @kernel

@@ -1,14 +1,14 @@
 # mypy: disable-error-code="assignment, no-any-return, operator, return-value"
 """Jump point search: a shortest path with eight neighbors where every cell costs the same.
 
-Straight runs are read off bit rows: one word of `Layout.stops` says where a run over 64 cells ends.
-Diagonal runs walk, look straight to both sides from every cell, and list what they see at once,
-without a node in between.
+All runs are read off lines of bits: a word of `Layout.stops` says where a straight run over 64 cells
+ends, and from which of 64 cells a diagonal run should look aside. What it sees there is listed at
+once, without a node in between.
 
 Harabor and Grastien, Online graph pruning for pathfinding on grid maps, AAAI 2011; Improving jump
-point search, ICAPS 2014 (blocks, intermediate jump points). Unlike there, a cell that is reached
-equally well from several sides goes on in the ways of all of them, and cells where links begin are
-jump points.
+point search, ICAPS 2014 (blocks, intermediate jump points). Unlike there, lines of bits run along
+diagonals too; a cell that is reached equally well from several sides goes on in the ways of all of
+them; and cells where links begin are jump points.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from bimnav.search.compiled import (
     NEVER,
     NOTHING,
     first_at_least,
+    forget,
     leading_zeros,
     lean,
     pop_least,
@@ -68,6 +69,32 @@ def _last_stop(stops: NDArray[np.uint64], first: int, place: int) -> int:
         if stops[word]:
             return place - 1 - leading_zeros(stops[word])
         place -= 64
+
+
+@lean
+def _look(
+    stops: NDArray[np.uint64],
+    first_stop: NDArray[np.int64],
+    row_words: int,
+    col_words: int,
+    goal_row: int,
+    goal_col: int,
+    row: int,
+    col: int,
+    way: int,
+) -> tuple[int, int]:
+    """Return row and column of the cell where a straight run ends: a stop, or the goal before it."""
+    if way == 0:
+        end = _next_stop(stops, first_stop[0] + row * row_words, col)
+        return row, goal_col if row == goal_row and col < goal_col < end else end
+    if way == 2:
+        end = _last_stop(stops, first_stop[2] + row * row_words, col)
+        return row, goal_col if row == goal_row and end < goal_col < col else end
+    if way == 1:
+        end = _next_stop(stops, first_stop[1] + col * col_words, row)
+        return goal_row if col == goal_col and row < goal_row < end else end, col
+    end = _last_stop(stops, first_stop[3] + col * col_words, row)
+    return goal_row if col == goal_col and end < goal_row < row else end, col
 
 
 @lean
@@ -128,7 +155,7 @@ def jump(
     keys: NDArray[np.int64],
     items: NDArray[np.int32],
     stamp: int,
-) -> tuple[int, int]:
+) -> int:
     """Search from start to goal, two free cells; leave the parents of jump points in `nodes`.
 
     A parent that a link comes from is stored as its complement.
@@ -137,8 +164,6 @@ def jump(
     -------
     outcome
         `FOUND`, `NOTHING`, or `FULL` if the heap was too small.
-    size
-        Of what is left on the heap.
     """
     row_words, col_words = (stride + 63) >> 6, (len(moves) // stride + 63) >> 6
     goal_row, goal_col = goal // stride, goal % stride
@@ -146,10 +171,11 @@ def jump(
     size = _reach(nodes, keys, items, 0, stamp, shrink, 0, 0, start, start, 0, max(moves[start] & 255, 1))
     while size:
         if size == len(keys):
-            return FULL, size
+            return FULL
         key, cell = keys[0], np.int64(items[0])
         if cell == goal:
-            return FOUND, size
+            forget(keys, size, NEVER)
+            return FOUND
         size = pop_least(keys, items, size, NEVER)
         node = nodes[cell]
         todo = np.int64(node.todo)
@@ -211,23 +237,9 @@ def jump(
                     break
                 while True:
                     if here >> SEES + side & 1 or at_row == goal_row or at_col == goal_col:
-                        end_row, end_col = at_row, at_col
-                        if side == 0:
-                            end_col = _next_stop(stops, first_stop[0] + at_row * row_words, at_col)
-                            if at_row == goal_row and at_col < goal_col < end_col:
-                                end_col = goal_col
-                        elif side == 2:
-                            end_col = _last_stop(stops, first_stop[2] + at_row * row_words, at_col)
-                            if at_row == goal_row and end_col < goal_col < at_col:
-                                end_col = goal_col
-                        elif side == 1:
-                            end_row = _next_stop(stops, first_stop[1] + at_col * col_words, at_row)
-                            if at_col == goal_col and at_row < goal_row < end_row:
-                                end_row = goal_row
-                        else:
-                            end_row = _last_stop(stops, first_stop[3] + at_col * col_words, at_row)
-                            if at_col == goal_col and end_row < goal_row < at_row:
-                                end_row = goal_row
+                        end_row, end_col = _look(
+                            stops, first_stop, row_words, col_words, goal_row, goal_col, at_row, at_col, side
+                        )
                         end = end_row * stride + end_col
                         if moves[end]:
                             size = _reach(
@@ -237,10 +249,11 @@ def jump(
                                 max(turns[side, moves[end] & 255], 1),
                             )  # fmt: skip
                             if end == goal and nodes[goal].length <= key:
-                                return FOUND, size
+                                forget(keys, size, NEVER)
+                                return FOUND
                     if side == last_side:
                         break
                     side = last_side
                 if way < 4 or not here >> way & 1:
                     break
-    return NOTHING, 0
+    return NOTHING

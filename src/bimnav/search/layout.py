@@ -181,6 +181,8 @@ class Layout:
         How far a move leads in flat indexes.
     least, greatest
         Bounds of the finite costs.
+    is_uniform
+        Whether every free cell costs the same.
     """
 
     def __init__(
@@ -198,6 +200,7 @@ class Layout:
         self.cost: NDArray[np.float32] = padded.ravel()
         self.moves: NDArray[np.uint16] = np.zeros(self.cost.size, dtype=np.uint16)
         self.least, self.greatest = _find_moves(self.cost, self.moves, self.stride)
+        self.is_uniform = self.least == self.greatest
         self.steps: NDArray[np.int64] = np.array(ROW_STEP) * self.stride + np.array(COL_STEP)
         self.turns, self.covered = _TURNS[connectivity], _COVERED[connectivity]
         origin, end = (self.padded(np.asarray(ends, dtype=np.int64)) for ends in links[:2])
@@ -211,11 +214,6 @@ class Layout:
         _, rows, cols = self.shape
         row, col = index // cols, index % cols
         return (row + 2 * (row // rows) + 1) * self.stride + col + 1
-
-    @property
-    def is_uniform(self) -> bool:
-        """Whether every free cell costs the same."""
-        return bool(self.least == self.greatest)
 
     @cached_property
     def is_symmetric(self) -> bool:

@@ -52,8 +52,8 @@ def order_rows(
         order = rows[best_order(_round_trip(cost, rows, end, closed))]
         order = order if end is None else np.append(order, end)
         return Ordering(order, _length(cost, order, closed), False)
-    ceiling = len(cost) * float(cost.max(initial=0.0, where=np.isfinite(cost))) + 1.0
-    cost = np.where(np.isfinite(cost), cost, ceiling)  # one such edge is worse than any tour without
+    finite = np.isfinite(cost)
+    cost = np.where(finite, cost, _more_than_any_tour(np.where(finite, cost, 0.0)))
     if np.allclose(cost, cost.T, rtol=_PROVED, atol=0.0):
         return _order_symmetric(cost, start, end, closed, time_limit)
     trip = _round_trip(cost, rows, end, closed)
@@ -76,11 +76,7 @@ def _round_trip(
 
 
 def _order_symmetric(
-    cost: NDArray[np.float64],
-    start: int,
-    end: int | None,
-    closed: bool,
-    time_limit: float | None,
+    cost: NDArray[np.float64], start: int, end: int | None, closed: bool, time_limit: float | None
 ) -> Ordering:
     if closed:
         order, cut_short = _improve(cost, True, time_limit)
@@ -89,7 +85,7 @@ def _order_symmetric(
     last = len(cost) if end is None else end
     if end is None:
         cost = np.pad(cost, (0, 1))  # a row that costs nothing to go to, after the real last one
-    bribe = 3 * float(cost.max())  # for a round trip that goes from its last row straight to the start
+    bribe = _more_than_any_tour(cost)  # for a round trip that goes from its last row straight to the start
     cost[start, last] = cost[last, start] = -bribe
     order, cut_short = _improve(cost, True, time_limit)
     order = np.roll(order, -int(np.flatnonzero(order == start)[0]))
@@ -123,6 +119,10 @@ def _directed_bound(cost: NDArray[np.float64]) -> float:
     np.fill_diagonal(others, 4 * cost.sum() + 1)
     assigned = float(others[linear_sum_assignment(others)].sum())
     return max(assigned, float(one_tree_bound(np.minimum(cost, cost.T), _rounds(cost))))
+
+
+def _more_than_any_tour(cost: NDArray[np.float64]) -> float:
+    return 2 * cost.size**0.5 * float(cost.max(initial=0.0)) or 1.0
 
 
 def _rounds(cost: NDArray[np.float64]) -> int:

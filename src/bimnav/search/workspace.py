@@ -57,11 +57,6 @@ class Workspace:
             self._arrivals = np.empty(cells, dtype=np.uint8)
         return self._reach[:cells], self._arrivals[:cells]
 
-    def empty_heap(self, left: int) -> None:
-        """Clear away what a search left on the heap."""
-        if left:
-            self.keys[:left] = NEVER
-
     def grow_heap(self) -> None:
         """Make a larger heap."""
         self._new_heap(4 * len(self.keys))

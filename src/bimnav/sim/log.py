@@ -11,7 +11,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
-from bimnav.errors import MissingExtraError, OutputError
+from bimnav._files import write_text
+from bimnav.errors import MissingExtraError
 from bimnav.sim.track import RobotStatus
 
 if TYPE_CHECKING:
@@ -116,10 +117,7 @@ class EventLog:
         """
         text = csv_text(self.columns, ([getattr(row, column) for column in self.columns] for row in self.rows))
         if path is not None:
-            try:
-                Path(path).write_text(text, encoding="utf-8", newline="")
-            except OSError as error:
-                raise OutputError(f"{path} cannot be written: {error.strerror}.", "Name another file.") from error
+            write_text(Path(path), text)
         return text
 
     def to_dataframe(self) -> pandas.DataFrame:

@@ -1,1 +1,0 @@
-"""Ways out: files other programs read."""
