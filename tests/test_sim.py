@@ -404,7 +404,7 @@ def test_names_of_targets_reach_the_log_file_escaped(tmp_path):
 
 
 def test_a_folder_is_no_log_file(tmp_path):
-    with pytest.raises(OutputError, match="cannot be written"):
+    with pytest.raises(OutputError, match="is a folder"):
         simulate(CORRIDOR).log.to_csv(tmp_path)
 
 

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from bimnav.errors import CacheError, OutputError
 from bimnav._files import write_bytes
+from bimnav.errors import CacheError, OutputError
 from bimnav.ifc._model import Model
 
 __all__ = ["Cache", "CacheInfo", "cache_folder", "cache_info", "clear_cache", "key_of", "pack", "unpack"]
