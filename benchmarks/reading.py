@@ -9,39 +9,30 @@ the folder that the environment variable BIMNAV_REAL_IFC names.
 from __future__ import annotations
 
 import argparse
-import gc
 import json
 import os
 import platform
 import re
-import resource
-import subprocess
-import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 from typing import Any
 
-import ifcopenshell
-import ifcopenshell.geom
 import numpy as np
 import shapely
 from building import Plan, write_building, write_hall
+from measuring import Job, alone, cpu, environment_of, plain_iteration, tessellation, warm_up
 from numpy.typing import NDArray
 from peers import boxes_of, sliced, voxelized
 
 import bimnav as bn
 from bimnav.errors import BimnavError
 from bimnav.grid import GridFrame, rasterize
-from bimnav.ifc import _extract
-from bimnav.ifc._geometry import read_geometry
-from bimnav.ifc._products import Relations, left_out_by_class, sanitize, sorted_of
 from bimnav.ifc._text import load
-from bimnav.tasks import Task
 
 REPOSITORY = Path(__file__).parents[1]
 PAGE = REPOSITORY / "docs" / "benchmarks.md"
@@ -54,18 +45,8 @@ ROUNDS, BUDGET = (3, 12), 15.0  # fewest and most; CPU seconds after which no fu
 PEERS = ("fm/BasicFM", "houses/SampleHouse4", "houses/231110AC11", "duplex/Duplex_A", "office/Office_A")
 RASTERS = ("duplex/Duplex_A", "office/Office_A", "generated")
 
-Job = Callable[[], object]
-
 
 # --- Measuring.
-
-
-def cpu(job: Job) -> float:
-    """Return the CPU seconds of a job, all threads of this process together."""
-    gc.collect()
-    start = time.process_time()
-    job()
-    return time.process_time() - start
 
 
 def fastest(*makers: Callable[[], Job], rounds: tuple[int, int] = ROUNDS) -> list[float]:
@@ -74,19 +55,6 @@ def fastest(*makers: Callable[[], Job], rounds: tuple[int, int] = ROUNDS) -> lis
     while len(times) < rounds[0] or (len(times) < rounds[1] and np.sum(times) < BUDGET):
         times.append([cpu(make()) for make in makers])
     return [float(least) for least in np.min(times, axis=0)]
-
-
-def peak() -> int:
-    """Return the most memory this process has held, bytes."""
-    try:  # the counter of `resource` may begin with what the parent held
-        status = Path("/proc/self/status").read_text()
-        return int(status.split("VmHWM:")[1].split()[0]) * 1024
-    except (OSError, IndexError):
-        return _kilobytes() * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-
-def _kilobytes() -> int:
-    return 1 if sys.platform == "darwin" else 1024
 
 
 @dataclass(slots=True)
@@ -132,44 +100,6 @@ class Model:
     text: Path
 
 
-def plain_iteration(path: Path) -> Job:
-    """B0: ifcopenshell's iterator with its defaults, one thread, local coordinates, annotations excluded."""
-    file: Any = ifcopenshell.open(path)
-
-    def job() -> int:
-        iterator: Any = ifcopenshell.geom.iterator(ifcopenshell.geom.settings(), file, 1, exclude=["IfcAnnotation"])
-        count, going = 0, iterator.initialize()
-        while going:
-            iterator.get()
-            count += 1
-            going = iterator.next()
-        return count
-
-    return job
-
-
-def tessellation(path: Path) -> Job:
-    """All that `extract` does but the tables: find bodies, tessellate, clip, retry, close, cut openings."""
-    file: Any = ifcopenshell.open(path)
-
-    def job() -> object:
-        products = sorted_of(file, "IfcProduct")
-        sanitize(products)
-        asked = [product for product in products if product.Representation]
-        solids, contexts, _ = _extract._sort_out(asked, left_out_by_class(file))
-        wanted = [product for product in asked if product.id() in solids]
-        openings = Relations.of(file).openings_of()
-        return read_geometry(file, wanted, solids, contexts, openings, lambda _: None)
-
-    return job
-
-
-def environment_of(path: Path, cache: bool | Path = False, robot: bn.Robot | None = None) -> bn.IndoorEnvironment:
-    """Open a file in this process and find the footprints of all storeys."""
-    building = bn.read_ifc(path, isolate=False, cache=cache)
-    return bn.make_environment(building, Task("nothing"), robot or bn.Robot())
-
-
 def against_kernel(models: Sequence[Model]) -> Table:
     """Compare tessellation, and the way from file to footprints, with B0."""
     columns = ("model", "B0 / tessellation", "B0 / footprints", "products", "B0, s", "tessellation, s", "footprints, s")
@@ -180,8 +110,8 @@ def against_kernel(models: Sequence[Model]) -> Table:
             partial(tessellation, model.text),
             lambda: partial(environment_of, model.path),  # noqa: B023
         )
-        count = len(environment_of(model.path).building.ledger.asked)
-        table.rows.append((model.name, plain / ours, plain / whole, count, plain, ours, whole))
+        products = len(environment_of(model.path).building.ledger.asked)
+        table.rows.append((model.name, plain / ours, plain / whole, products, plain, ours, whole))
     table.judge(1, 5, 7)
     table.judge(2, 2.5, 3)
     return table
@@ -189,15 +119,15 @@ def against_kernel(models: Sequence[Model]) -> Table:
 
 def copies(folder: Path) -> Table:
     """Compare a hall with many copies of a mapped chair with the hall with one, from file to footprints."""
-    counts = (1, 100, 1000, 5000, 12000)
-    paths = [folder / f"hall{count}.ifc" for count in counts]
-    for path, count in zip(paths, counts, strict=True):
-        write_hall(path, count)
+    numbers = (1, 100, 1000, 5000, 12000)
+    paths = [folder / f"hall{number}.ifc" for number in numbers]
+    for path, number in zip(paths, numbers, strict=True):
+        write_hall(path, number)
     times = fastest(*(partial(partial, environment_of, path) for path in paths))
     table = Table("copies", ("copies", "allowed / taken", "microseconds for each", "footprints, s"))
-    for count, taken in zip(counts[1:], times[1:], strict=True):
-        allowed = 1.2 * times[0] + 100e-6 * count
-        table.rows.append((count, allowed / taken, (taken - times[0]) / (count - 1) * 1e6, taken))
+    for number, taken in zip(numbers[1:], times[1:], strict=True):
+        allowed = 1.2 * times[0] + 100e-6 * number
+        table.rows.append((number, allowed / taken, (taken - times[0]) / (number - 1) * 1e6, taken))
     table.remarks.append(f"One copy takes {times[0]:.3g} s; allowed are 1.2 times that and 100 microseconds for each.")
     table.judge(1, 1)
     return table
@@ -251,22 +181,33 @@ def _raster(frame: GridFrame, polygons: Sequence[Any]) -> tuple[object, ...]:
 
 def second_open(models: Sequence[Model], folder: Path) -> Table:
     """Compare the first way from file to footprints with the next ones, from the cache."""
-    table = Table(
-        "cache", ("model", "first / same band", "first / new band", "first, s", "same band, s", "new band, s")
+    columns = (
+        "model",
+        "first, apart / same band",
+        "first, here / same band",
+        "first, here / new band",
+        "first, apart, s",
+        "first, here, s",
+        "same band, s",
+        "new band, s",
     )
+    table = Table("cache", columns)
     for number, model in enumerate(models):
-        fresh = (folder / f"cache{number}-{k}" for k in range(ROUNDS[1]))
+        fresh = (folder / f"cache{number}-{k}" for k in count())
         warm = folder / f"cache{number}"
-        bands = (bn.Robot(height=1.5 + k / 100) for k in range(ROUNDS[1]))
+        bands = (bn.Robot(height=1.5 + k / 100) for k in count())
         environment_of(model.path, warm)
         times = fastest(
+            lambda: partial(environment_of, model.path, next(fresh), isolate=True),  # noqa: B023
             lambda: partial(environment_of, model.path, next(fresh)),  # noqa: B023
             lambda: partial(environment_of, model.path, warm),  # noqa: B023
             lambda: partial(environment_of, model.path, warm, next(bands)),  # noqa: B023
         )
-        table.rows.append((model.name, times[0] / times[1], times[0] / times[2], *times))
+        apart, here, same, new = times
+        table.rows.append((model.name, apart / same, here / same, here / new, *times))
     table.judge(1, 30)
-    table.judge(2, 2)
+    table.judge(2, 30)
+    table.judge(3, 2)
     return table
 
 
@@ -277,8 +218,8 @@ def memory(models: Sequence[Model]) -> Table:
     for model in models:
         size = model.path.stat().st_size / MEGABYTE
         allowed = 250 + 12 * size
-        peaks = [child("footprints", model.path)["peak"], *child("apart", model.path)["peaks"]]
-        whole, caller, worker = (float(number / MEGABYTE) for number in peaks)
+        here, apart = alone("footprints", model.path), alone("apart", model.path)
+        whole, caller, worker = (n / MEGABYTE for n in (here["peak"], apart["peak"], apart["worker_peak"]))
         table.rows.append((model.name, allowed / max(whole, caller, worker), size, whole, caller, worker, allowed))
     table.judge(1, 1)
     return table
@@ -340,41 +281,18 @@ def growth(folder: Path, sizes: Sequence[int] = SIZES) -> Table:
     table = Table("growth", (*columns, "allowed, MB"))
     for size in sizes:
         path = folder / f"growth{size}.ifc"
-        count = len(write_building(path, Plan.of_size(size)).products)
+        products = len(write_building(path, Plan.of_size(size)).products)
         megabytes = path.stat().st_size / MEGABYTE
         own, plain = [], []
         for _ in range(3 if size < 20_000 else 2):
-            own.append(child("footprints", path))
-            plain.append(child("plain", path))
-        seconds, base = (min(each["cpu"] for each in runs) for runs in (own, plain))
-        top = min(each["peak"] for each in own) / MEGABYTE
-        row = (count, base / seconds, megabytes, seconds, seconds / count * 1e6, base, top, 250 + 12 * megabytes)
-        table.rows.append(row)
+            own.append(alone("footprints", path))
+            plain.append(alone("plain", path))
+        seconds, base = (min(run["cpu"] for run in runs) for runs in (own, plain))
+        top = min(run["peak"] for run in own) / MEGABYTE
+        each = seconds / products * 1e6
+        table.rows.append((products, base / seconds, megabytes, seconds, each, base, top, 250 + 12 * megabytes))
     table.judge(1, 2.5, 3)
     return table
-
-
-# --- Processes of their own.
-
-
-def child(what: str, path: Path) -> dict[str, Any]:
-    """Measure in a fresh process; see `answer`."""
-    command = [sys.executable, str(Path(__file__)), "--child", what, str(path)]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return found
-
-
-def answer(what: str, path: Path) -> dict[str, Any]:
-    """Do one measurement as the child."""
-    if what == "apart":
-        bn.make_environment(bn.read_ifc(path, cache=False), Task("nothing"), bn.Robot())
-        worker = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * _kilobytes()
-        return {"peaks": [peak(), worker]}
-    if what == "plain":
-        return {"cpu": cpu(plain_iteration(path)), "peak": peak()}
-    environment_of(bn.sample("apartment"))  # load what is compiled
-    return {"cpu": cpu(partial(environment_of, path)), "peak": peak()}
 
 
 # --- Which models, and the way out.
@@ -392,14 +310,14 @@ def real_models(folder: Path) -> Iterator[Model]:
             if path.suffix != ".ifc":
                 text = folder / f"{path.stem}.ifc"
                 text.write_bytes(load(path))
-            yield Model(f"{path.parent.name}/{path.stem[:24]}", path, text)
+            yield Model(f"{path.parent.name}/{path.stem}", path, text)
 
 
-def generated_models(folder: Path) -> Iterator[Model]:
-    """Write the large building."""
-    path = folder / "generated.ifc"
-    write_building(path)
-    yield Model("generated", path, path)
+def generated_model(folder: Path, products: int = 18_000) -> Model:
+    """Write a generated building."""
+    path = folder / f"generated{products}.ifc"
+    write_building(path, Plan.of_size(products))
+    return Model(f"generated, {products:,} products", path, path)
 
 
 def machine() -> dict[str, str]:
@@ -453,23 +371,21 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", metavar="PART", help="some of the tables, by name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
     parser.add_argument("--publish", action="store_true", help=f"put the tables into {PAGE.name}")
-    parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
-    if chosen.child:
-        print(json.dumps(answer(chosen.child[0], Path(chosen.child[1]))))
-        return
-    environment_of(bn.sample("apartment"))  # load what is compiled
+    warm_up()
     with tempfile.TemporaryDirectory(prefix="bimnav-bench-") as name:
         folder = Path(name)
         models = [*real_models(folder)] if chosen.models != "generated" else []
-        models += [*generated_models(folder)] if chosen.models != "real" else []
+        models += [generated_model(folder)] if chosen.models != "real" else []
         parts: dict[str, Callable[[], Table]] = {
             "kernel": lambda: against_kernel(models),
             "copies": lambda: copies(folder),
             "raster": lambda: rasters([model for model in models if model.name.startswith(RASTERS)]),
             "cache": lambda: second_open(models, folder),
             "memory": lambda: memory(models),
-            "peers": lambda: peers([model for model in models if model.name.startswith(PEERS)]),
+            "peers": lambda: peers(
+                [model for model in models if model.name.startswith(PEERS)] + [generated_model(folder, 1_000)]
+            ),
             "growth": lambda: growth(folder),
         }
         tables = []

@@ -38,7 +38,7 @@ from bimnav.ifc import cache_info, clear_cache, read_ifc
 from bimnav.ifc._store import cache_folder, key_of, pack, unpack
 from bimnav.ifc._watch import Limits, read_apart
 from tests.conftest import real_model
-from tests.ifc_text import box, crasher, model, staller
+from tests.ifc_text import box, crasher, model, product, staller
 from tests.test_prescan import REAL_MODELS
 
 posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and process groups")
@@ -111,10 +111,9 @@ def test_a_model_becomes_a_building(house: Path, isolate: bool):
     assert not building.ledger.lost
 
 
-def test_one_file_at_a_time(house: Path):
-    for paths in ((), (house, house)):
-        with pytest.raises(InputError, match=f"{len(paths)} files"):
-            read_ifc(*paths)
+def test_a_file_is_needed():
+    with pytest.raises(InputError, match="no file"):
+        read_ifc()
 
 
 def test_two_readings_are_equal_to_the_last_byte_in_whatever_process(house: Path):
@@ -155,11 +154,33 @@ def test_what_is_no_file_is_refused_before_any_process(tmp_path: Path, monkeypat
         read_ifc(tmp_path)
 
 
-def test_a_product_of_a_class_the_schema_lacks_opens_the_ledger(tmp_path: Path):
+def test_a_product_of_a_class_the_schema_lacks_is_lost(tmp_path: Path):
     building = read_ifc(written(tmp_path, box(200, ifc_class="IFCHOLOGRAM")))
-    [issue] = [issue for issue in building.issues if issue.code == "open-ledger"]
+    lost = f"{200:022d}"
+    assert building.ledger.lost == {lost: "IFC4 has no class IFCHOLOGRAM"}
+    assert len(building.ledger.asked) == 2
+    [issue] = [issue for issue in building.issues if issue.code == "damaged-text"]
     assert issue.severity == "error"
-    assert "2 products" in issue.message
+    assert issue.global_ids == (lost,)
+
+
+@pytest.mark.parametrize("number", [201, 202, 203, 204])
+def test_a_product_whose_body_or_place_refers_to_nothing_is_lost(tmp_path: Path, number: int):
+    lines = [line for line in box(200) if not line.startswith(f"#{number}=")]
+    building = read_ifc(written(tmp_path, lines))
+    lost = f"{200:022d}"
+    assert building.ledger.lost == {lost: f"it refers to #{number}, which is not there or cannot be read"}
+    assert lost in building.ledger.asked
+    assert lost not in building.ledger.left_out
+    assert building.ledger.read == (f"{100:022d}",)
+
+
+def test_a_corner_that_is_missing_deep_in_a_body_makes_it_lost_but_not_its_neighbors(tmp_path: Path):
+    brep = ["#205=IFCCLOSEDSHELL((#206));", "#206=IFCFACE((#207));", "#207=IFCFACEOUTERBOUND(#208,.T.);"]
+    lines = product(200, "#204=IFCFACETEDBREP(#205);", *brep, "#208=IFCPOLYLOOP((#6,#6,#777));")
+    building = read_ifc(written(tmp_path, lines, box(300)))
+    assert list(building.ledger.lost) == [f"{200:022d}"]
+    assert "#777" in building.ledger.lost[f"{200:022d}"]
 
 
 def test_an_entity_the_parser_drops_is_a_refusal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -217,6 +238,14 @@ def test_a_product_that_crashes_the_kernel_is_lost_and_the_rest_is_read(
         caplog.clear()
         assert read_ifc(path).ledger.lost == building.ledger.lost  # from the cache
         assert caplog.text == ""
+
+
+@posix
+@pytest.mark.parametrize("number", [50, 500])
+def test_the_first_product_and_the_last_may_crash_as_well(tmp_path: Path, number: int):
+    building = read_ifc(written(tmp_path, crasher(number), box(200)), cache=False)
+    assert list(building.ledger.lost) == [f"{number:022d}"]
+    assert {element.name for element in building if element.shapes} == {"box"}
 
 
 @posix
@@ -470,7 +499,7 @@ def test_the_content_counts_not_the_name(house: Path, tmp_path: Path, monkeypatc
 
 def test_damage_is_noticed_and_mended_with_one_warning(house: Path, caplog: pytest.LogCaptureFixture):
     expected = [element.name for element in read_ifc(house)]
-    [entry] = cache_info().folder.iterdir()
+    [entry] = cache_info().folder.glob("*.bimnav")
     whole = entry.read_bytes()
     for position in random.Random(3).sample(range(len(whole)), 3):
         damaged = bytearray(whole)
@@ -573,7 +602,7 @@ def test_real_models_are_read_and_their_ledgers_close(name: str, full: bool):
             read_ifc(path)
         return
     building = read_ifc(path)
-    assert "open-ledger" not in {issue.code for issue in building.issues}
+    assert "damaged-text" not in {issue.code for issue in building.issues}
     assert building.ledger.lost == {}
     for element in building:
         assert element.global_id in building

@@ -20,11 +20,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from bimnav.errors import MissingExtraError, OutputError, SimulationError, ValueRangeError
-from bimnav.graph import NavGraph, Stop, Unreached
+from bimnav.graph import NavGraph
 from bimnav.grid import Cell, GridFrame
 from bimnav.robot import Robot
 from bimnav.sim import Event, EventLog, RobotStatus, SimResult, simulate
 from bimnav.sim.log import csv_text
+from bimnav.stops import Stop, Unreached
 
 TWO_STOREYS = NavGraph.from_mask(np.ones((2, 1, 1), dtype=bool))  # floors at 0 and 3 m
 SLOW = Robot(name="R1", speed=0.5)
@@ -434,7 +435,8 @@ PLAYED_ELSEWHERE = """
 import sys
 from types import SimpleNamespace as N
 import numpy as np
-from bimnav.graph import NavGraph, Stop
+from bimnav.graph import NavGraph
+from bimnav.stops import Stop
 from bimnav.grid import Cell
 from bimnav.sim import simulate
 points = np.random.default_rng(5).uniform(0, 50, (40, 3)) * (1, 1, 0)

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bimnav._georeference import Georeference as Georeference
     from bimnav._start import Start as Start, find_start as find_start
     from bimnav.building import (
         Building as Building,
@@ -38,12 +39,11 @@ if TYPE_CHECKING:
         Conflict as Conflict,
         NavGraph as NavGraph,
         NodeKind as NodeKind,
-        Stop as Stop,
-        Unreached as Unreached,
         build_graph as build_graph,
     )
     from bimnav.grid import Cell as Cell, GridFrame as GridFrame, rasterize as rasterize
     from bimnav.ifc import read_ifc as read_ifc
+    from bimnav.ifc._federate import federate as federate
     from bimnav.inspection import inspect as inspect
     from bimnav.mission import Mission as Mission, run as run
     from bimnav.plan import (
@@ -56,9 +56,11 @@ if TYPE_CHECKING:
         plan_tour as plan_tour,
     )
     from bimnav.plot import plot_environment as plot_environment, plot_graph as plot_graph, plot_tour as plot_tour
+    from bimnav.readiness import Readiness as Readiness
     from bimnav.robot import Robot as Robot
     from bimnav.samples import list_samples as list_samples, sample as sample
     from bimnav.sim import SimResult as SimResult, simulate as simulate
+    from bimnav.stops import Stop as Stop, Unreached as Unreached
     from bimnav.tasks import Rule as Rule, Task as Task, list_tasks as list_tasks, load_task as load_task
     from bimnav.verify import Check as Check, check_path as check_path, check_plan as check_plan
 
@@ -69,14 +71,18 @@ _HOMES = {
     "bimnav.detections": "read_targets",
     "bimnav.environment": "IndoorEnvironment Obstacle Region Target Zone make_environment",
     "bimnav.errors": "BimnavError",
-    "bimnav.graph": "Conflict NavGraph NodeKind Stop Unreached build_graph",
+    "bimnav.graph": "Conflict NavGraph NodeKind build_graph",
+    "bimnav.stops": "Stop Unreached",
     "bimnav.grid": "Cell GridFrame rasterize",
     "bimnav.ifc": "read_ifc",
     "bimnav.inspection": "inspect",
+    "bimnav._georeference": "Georeference",
     "bimnav._start": "Start find_start",
+    "bimnav.ifc._federate": "federate",
     "bimnav.mission": "Mission run",
     "bimnav.plan": "Path Tour distance_field distance_matrix find_path order_stops plan_tour",
     "bimnav.plot": "plot_environment plot_graph plot_tour",
+    "bimnav.readiness": "Readiness",
     "bimnav.robot": "Robot",
     "bimnav.samples": "list_samples sample",
     "bimnav.sim": "SimResult simulate",

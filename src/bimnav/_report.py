@@ -39,7 +39,7 @@ def report_of(mission: Mission) -> dict[str, Any]:
     environment, result = mission.environment, mission.result
     counts = graph.counts
     return {
-        "model": building.sources[0] if building.sources else building.name,
+        "model": " + ".join(building.sources) or building.name,
         "schema": building.schema,
         "task": mission.task.name,
         "robot": {

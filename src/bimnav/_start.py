@@ -87,17 +87,20 @@ def _docks(environment: IndoorEnvironment) -> Iterable[tuple[Element | Space, st
 
 def _nearest_free(graph: NavGraph, storey: int, x: float, y: float) -> tuple[Cell, tuple[float, float, float]] | None:
     """Return the free cell nearest to a point, and the point itself if the robot can stand on it."""
+    frame = graph.frame
+    x0, y0, x1, y1 = frame.bounds
+    if x0 <= x < x1 and y0 <= y < y1:
+        own = frame.cell_at(x, y, storey=storey)
+        if graph.free[own] and _environment_of(graph).is_clear(storey, (x, y)):
+            return own, (x, y, frame.elevations[storey])
     rows, cols = np.nonzero(graph.free[storey])
     if not len(rows):
         return None
-    centers = graph.frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
-    distance = np.round(np.hypot(centers[:, 0] - x, centers[:, 1] - y), 9)
+    centers = frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
+    distance = np.round(np.hypot(centers[:, 0] - x, centers[:, 1] - y), 9)  # equally near: by row and column
     k = int(np.lexsort((cols, rows, distance))[0])
     cell = Cell(storey, int(rows[k]), int(cols[k]))
-    x0, y0, x1, y1 = graph.frame.box_of(cell)
-    if x0 <= x < x1 and y0 <= y < y1 and _environment_of(graph).is_clear(storey, (x, y)):
-        return cell, (x, y, graph.frame.elevations[storey])
-    return cell, graph.frame.center_of(cell)
+    return cell, frame.center_of(cell)
 
 
 def _start_at(graph: NavGraph, place: Place) -> Start:

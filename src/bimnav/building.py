@@ -11,12 +11,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bimnav.errors import GeometryError, ModelError, ValueRangeError
+
+if TYPE_CHECKING:
+    from bimnav._georeference import Georeference
+    from bimnav.readiness import Readiness
+    from bimnav.robot import Robot
 
 __all__ = [
     "Building",
@@ -236,12 +241,25 @@ class Door:
         The void it fills; None for a door in a curtain wall.
     width, height
         Overall size in metres as the file says; None where it says nothing.
+    clear_width
+        Width in metres measured on the opening, else on the leaf, else as the file says.
+    sill
+        How far, in metres, the bottom of the opening lies above the lower floor at its sides; 0 where it
+        reaches the floor. None if nothing tells where the floor is.
+    spaces
+        GlobalIds of the rooms at its sides: two for an inner door, the same twice for one within a room,
+        one for a door to the outside.
+
+    A building measures what its doors leave open.
     """
 
     element: Element
     opening: Opening | None = None
     width: float | None = None
     height: float | None = None
+    clear_width: float | None = None
+    sill: float | None = None
+    spaces: tuple[str, ...] = ()
 
     @property
     def global_id(self) -> str:
@@ -313,11 +331,14 @@ class Ledger:
         GlobalId to the named rule that left it out.
     lost
         GlobalId to the reason why its geometry could not be had.
+    lost_bounds
+        GlobalId to a box, (2, 3) metres, that holds what was lost, where the file tells.
     """
 
     asked: tuple[str, ...] = ()
     left_out: Mapping[str, str] = field(default_factory=dict)
     lost: Mapping[str, str] = field(default_factory=dict)
+    lost_bounds: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @property
     def read(self) -> tuple[str, ...]:
@@ -415,6 +436,12 @@ class Building:
         Answers `select`: a query to GlobalIds. A building written by hand has a small one of its own.
     property_reader
         Answers `properties`: a GlobalId to property sets.
+    property_readers
+        The same for each file of several, by its path.
+    georeference
+        Where on Earth the model lies, if it says so.
+    anchors
+        GlobalIds of sites, buildings and storeys to their placements, (4, 4) float64, metres.
     """
 
     name: str
@@ -432,6 +459,9 @@ class Building:
     sources: tuple[str, ...] = ()
     selector: Callable[[str], Iterable[str]] | None = None
     property_reader: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None
+    property_readers: Mapping[str, Callable[[str], Mapping[str, Mapping[str, Any]]]] = field(default_factory=dict)
+    georeference: Georeference | None = None
+    anchors: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.storeys:
@@ -440,6 +470,10 @@ class Building:
         if heights != sorted(heights):
             raise ModelError(f"the storeys of {self.name!r} are not ordered by elevation.", "Sort them.")
         object.__setattr__(self, "ledger", self.ledger if self.ledger.asked else self._own_ledger())
+        if any(door.clear_width is None for door in self.doors):
+            from bimnav._doorways import measured
+
+            object.__setattr__(self, "doors", measured(self))
 
     def _own_ledger(self) -> Ledger:
         return Ledger(asked=tuple(e.global_id for e in self.elements if e.shapes))
@@ -484,6 +518,20 @@ class Building:
     def properties(self, global_id: str) -> Mapping[str, Mapping[str, Any]]:
         """Return the property sets of a product, `{set: {property: value}}`, as the file writes them."""
         return {} if self.property_reader is None else self.property_reader(global_id)
+
+    def properties_by_source(self, global_id: str) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
+        """Return the property sets of a product file by file, `{path: {set: {property: value}}}`."""
+        readers = self.property_readers
+        if not readers and self.property_reader:
+            readers = {self.sources[0] if self.sources else self.name: self.property_reader}
+        found = {path: read(global_id) for path, read in readers.items()}
+        return {path: sets for path, sets in found.items() if sets}
+
+    def readiness(self, robot: Robot | None = None, *, cell_size: float = 0.05) -> Readiness:
+        """Say which rooms, doors and floor a robot reaches, and why not the rest; see `readiness`."""
+        from bimnav.readiness import readiness
+
+        return readiness(self, robot, cell_size=cell_size)
 
     def storey_index(self, storey: str | int) -> int:
         """Return the index of a storey given by name, GlobalId or index.

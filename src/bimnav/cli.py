@@ -1,4 +1,4 @@
-"""The command line: `bimnav run`, `inspect`, `tasks` and `doctor`."""
+"""The command line: `bimnav run`, `inspect`, `tasks`, `cache` and `doctor`."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_RUN_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    run.add_argument("model", metavar="MODEL.ifc")
+    run.add_argument("models", nargs="+", metavar="MODEL.ifc", help="one file, or several of one building")
     run.add_argument("--task", default="cleaning", help="built-in task or path of a task file (default: cleaning)")
     run.add_argument("--cell", type=_length, default=0.3048, metavar="SIZE", help="edge of a cell (default: 1ft)")
     run.add_argument("--connectivity", type=int, choices=(4, 8), default=4, help="neighbors of a cell (default: 4)")
@@ -102,6 +102,13 @@ def _parser() -> argparse.ArgumentParser:
         default="approach",
         help="a target on an obstacle cell: go next to it, or on it as in the paper (default: approach)",
     )
+    run.add_argument(
+        "--lost",
+        choices=("abort", "box", "ignore"),
+        default="abort",
+        help="elements whose geometry was lost: refuse a way through their place, take their box as an obstacle, "
+        "or leave them out (default: abort)",
+    )
     run.add_argument("--return", dest="return_to_start", action="store_true", help="go back to the start in the end")
     run.add_argument("--seed", type=int, default=0, help="for what is random (default: 0)")
     run.add_argument("--out", metavar="DIR", help="write figures, tables and the report here")
@@ -109,7 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(command=_run)
 
     inspect = commands.add_parser("inspect", help="say what a model holds, and what is wrong with it")
-    inspect.add_argument("model", metavar="MODEL.ifc")
+    inspect.add_argument("models", nargs="+", metavar="MODEL.ifc", help="one file, or several of one building")
     inspect.add_argument("--json", action="store_true")
     inspect.set_defaults(command=_inspect)
 
@@ -117,6 +124,11 @@ def _parser() -> argparse.ArgumentParser:
     tasks.add_argument("action", nargs="?", choices=("list", "schema"), default="list")
     tasks.add_argument("--json", action="store_true")
     tasks.set_defaults(command=_tasks)
+
+    cache = commands.add_parser("cache", help="show or clear what reading has kept")
+    cache.add_argument("action", nargs="?", choices=("show", "clear"), default="show")
+    cache.add_argument("--json", action="store_true")
+    cache.set_defaults(command=_cache)
 
     doctor = commands.add_parser("doctor", help="print versions and test the installation")
     doctor.add_argument("--json", action="store_true")
@@ -153,7 +165,7 @@ def _run(options: argparse.Namespace) -> int:
     for path in options.targets:
         placed += read_targets(path)
     mission = bn.run(
-        options.model,
+        options.models,
         task=options.task,
         cell_size=options.cell,
         connectivity=options.connectivity,
@@ -163,6 +175,7 @@ def _run(options: argparse.Namespace) -> int:
         refine=options.refine,
         on_conflict=options.on_conflict,
         return_to_start=options.return_to_start,
+        lost=options.lost,
         seed=options.seed,
         out=options.out,
     )
@@ -212,7 +225,7 @@ def _summary(report: dict[str, Any], *, is_point: bool) -> str:
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    report = bn.inspect(bn.read_ifc(options.model))
+    report = bn.inspect(bn.read_ifc(options.models))
     if options.json:
         _print_json(report)
         return _DONE
@@ -245,6 +258,21 @@ def _tasks(options: argparse.Namespace) -> int:
         _print_json([{"name": t.name, "description": t.description, "source": t.source} for t in known])
     else:
         _print("\n".join(f"{task.name:<20} {task.description}" for task in known))
+    return _DONE
+
+
+def _cache(options: argparse.Namespace) -> int:
+    from bimnav.ifc import cache_info, clear_cache
+
+    if options.action == "clear":
+        count = clear_cache()
+        _print_json({"removed": count}) if options.json else _print(f"removed {count} models")
+        return _DONE
+    info = cache_info()
+    if options.json:
+        _print_json({"folder": str(info.folder), "models": info.models, "bytes": info.size})
+    else:
+        _print(f"{info.models} models, {info.size / 1e6:.1f} MB in {info.folder}")
     return _DONE
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import shapely
 
-from bimnav._floors import NEAR, FloorSource, find_floors, outline
+from bimnav._floors import FLOOR_SOURCES, NEAR, FloorSource, find_floors, outline
 from bimnav.building import Building, Detection, Element, Issue, Space, Storey
 from bimnav.errors import ValueRangeError
 from bimnav.footprint import Footprint, footprints_of, merge_footprints
@@ -34,13 +34,14 @@ class Region:
     Parameters
     ----------
     global_id
-        Of the space, slab, door or opening it comes from; of the storey for a hull.
+        Of the space, slab, door or opening it comes from; of the storey for a hull or a margin.
     storey
         Index of the storey.
     polygon
         Plan view in world coordinates, metres.
     source
-        What says that one can walk here.
+        What says that one can walk here: `space`, `slab`, `covering` or `landing` (its upper side), `hull`
+        (guessed from walls), `door`, `passage` (an opening that nothing fills), `outdoors`.
     """
 
     global_id: str
@@ -142,7 +143,7 @@ class IndoorEnvironment:
     ----------
     storeys
         What `storey` indexes in regions, obstacles, targets and cells: the building's storeys by the
-        height of their floor. A storey whose spaces lie at several heights is several of these.
+        height of their floor. A storey whose rooms or slabs lie at several heights is several of these.
     levels
         World height of the walkable floor of every storey, metres.
     regions
@@ -250,18 +251,26 @@ def grown(polygon: BaseGeometry, radius: float) -> BaseGeometry:
 
 def _floor(polygons: Sequence[BaseGeometry], radius: float) -> BaseGeometry:
     """Join regions over small gaps and keep the robot's body on them."""
-    joined = shapely.buffer(shapely.union_all(polygons), _GAP, join_style="mitre")
+    joined = shapely.buffer(shapely.geometrycollections(polygons), _GAP, join_style="mitre")
     return grown(shapely.buffer(joined, -_GAP, join_style="mitre"), -radius)
 
 
 def make_environment(
-    building: Building, task: Task, robot: Robot | None = None, *, start: Place | None = None
+    building: Building,
+    task: Task,
+    robot: Robot | None = None,
+    *,
+    start: Place | None = None,
+    floor_from: Collection[FloorSource] = FLOOR_SOURCES,
+    outdoors: bool = False,
 ) -> IndoorEnvironment:
     """Work out where a robot can go in a building, what blocks it, and what a task wants visited.
 
-    Floor comes from spaces, else slabs, else the hull of the storey's walls, and from doorways and
-    passages. Everything solid in the robot's height band blocks, from just above the floor
-    (`robot.step_height`) to the robot's height, unless it is a door or the task says otherwise.
+    Floor comes from spaces, from slabs, coverings and landings between them and on levels of their own,
+    else from what the storey's walls enclose, and from doorways and passages. Holes in slabs, shafts and
+    voids are no floor, and neither is the outside. Everything solid in the robot's height band blocks, from
+    just above the floor (`robot.step_height`) to the robot's height, unless it is a door or the task says
+    otherwise.
 
     Parameters
     ----------
@@ -274,16 +283,21 @@ def make_environment(
     start
         Where the job begins, `(x, y)` or `(x, y, storey)`: detections that name no storey lie on its
         storey. Without it they lie on the lowest floor at their point.
+    floor_from
+        What may say that there is floor: any of `space, slab, covering, landing, hull, door, passage`.
+    outdoors
+        Whether the ground around the building is floor too: slabs and terrain as high as a level, else a
+        margin of two metres around the lowest level with a door to the outside.
     """
     from bimnav.tasks import match
 
     robot = robot or Robot()
-    floors, issues = find_floors(building, robot)
+    floors, issues = find_floors(building, robot, sources=floor_from, outdoors=outdoors)
     levels = tuple(floor.level for floor in floors)
     regions = tuple(
-        Region(global_id, name, storey, polygon, source)
+        Region(piece.global_id, piece.name, storey, piece.polygon, piece.source)
         for storey, floor in enumerate(floors)
-        for global_id, name, polygon, source in floor.pieces
+        for piece in floor.pieces
     )
     walkable = sorted({region.storey for region in regions})
 

@@ -31,7 +31,7 @@ __all__ = ["Footprint", "footprint", "footprints_of", "merge_footprints", "proje
 
 _TOUCH = 1e-4  # metres taken off both ends of a band: touching is not overlap
 _SLACK = 1e-8  # metres within which a height is the end of the band
-_INFLATION = 1e-5  # metres; where faces of host and opening are flush, a skin would stay
+_INFLATION = 2e-7  # metres; where faces of host and opening are flush, a skin would stay
 _WELDS = (1e-6, 1e-5)  # metres within which corners are taken for one
 _TILT = 1e-12  # radians that move no point of any model
 _ROUNDING = 1e-8  # metres to which manifold3d rounds in the plane

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import asdict
 from typing import Any
 
-import shapely
-
+from bimnav._connectors import describe_connectors
 from bimnav._report import issues_as_values
 from bimnav.building import Building
 from bimnav.environment import IndoorEnvironment, make_environment
+from bimnav.footprint import unite
 from bimnav.robot import Robot
 from bimnav.tasks import Task
 
@@ -29,9 +30,10 @@ def inspect(building: Building, robot: Robot | None = None) -> dict[str, Any]:
     Returns
     -------
     report
-        `name, schema, unit, storeys [{name, elevation, floor_area, spaces, doors}], elements, classes,
-        ledger {asked, footprinted, outside_bands, left_out, lost}, left_out, lost, issues`. Metres and
-        square metres; the counts of the ledger add up: asked is the sum of the other four.
+        `name, schema, unit, storeys [{name, elevation, floor_area, floor_from, spaces, doors}], elements,
+        classes, connectors, ledger {asked, footprinted, outside_bands, left_out, lost}, left_out, lost,
+        issues`. Metres and square metres; `floor_from` is the area by what says that there is floor. The
+        counts of the ledger add up: asked is the sum of the other four.
     """
     environment = make_environment(building, Task("inspect", "everything that blocks"), robot)
     ledger = ledger_of(environment)
@@ -45,7 +47,8 @@ def inspect(building: Building, robot: Robot | None = None) -> dict[str, Any]:
             "global_id": storey.global_id,
             "elevation": storey.elevation,
             "floor_level": level,
-            "floor_area": shapely.area(shapely.union_all([r.polygon for r in environment.regions if r.storey == k])),
+            "floor_area": unite(r.polygon for r in environment.regions if r.storey == k).area,
+            "floor_from": _by_source(environment, k),
             "spaces": spaces[k],
             "doors": doors[k],
         }
@@ -60,12 +63,20 @@ def inspect(building: Building, robot: Robot | None = None) -> dict[str, Any]:
         "doors": len(building.doors),
         "elements": len(building.elements),
         "classes": dict(sorted(Counter(element.ifc_class for element in building.elements).items())),
+        "connectors": [asdict(connector) for connector in describe_connectors(building)],
         "ledger": {"asked": sum(len(entry) for entry in ledger.values())}
         | {name: len(entry) for name, entry in ledger.items()},
         "left_out": ledger["left_out"],
         "lost": ledger["lost"],
         "issues": issues_as_values((*building.issues, *environment.issues)),
     }
+
+
+def _by_source(environment: IndoorEnvironment, storey: int) -> dict[str, float]:
+    """Return the area of the floor of a storey by its source, square metres."""
+    regions = [region for region in environment.regions if region.storey == storey]
+    sources = sorted({region.source for region in regions})
+    return {source: unite(r.polygon for r in regions if r.source == source).area for source in sources}
 
 
 def ledger_of(environment: IndoorEnvironment) -> dict[str, dict[str, str]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import shapely
 
+from bimnav._lost import Lost, refuse_lost, with_boxes
 from bimnav._report import report_of, write_mission
 from bimnav._start import Start, find_start
 from bimnav.building import Building, Detection
@@ -56,7 +57,7 @@ class Mission:
 
 
 def run(
-    model: str | Path | Building,
+    model: str | Path | Building | Sequence[str | Path],
     *,
     task: str | Task = "cleaning",
     cell_size: float = 0.3048,
@@ -67,6 +68,7 @@ def run(
     refine: Literal["auto"] | None = None,
     on_conflict: Literal["approach", "reach"] = "approach",
     return_to_start: bool = False,
+    lost: Lost | Mapping[str, Lost] = "abort",
     seed: int = 0,
     out: str | Path | None = None,
     progress: bool | Progress | None = None,
@@ -76,7 +78,7 @@ def run(
     Parameters
     ----------
     model
-        Path of an IFC file, or a building.
+        Path of an IFC file, paths of several files of one building, or a building.
     task
         Name of a built-in task, path of a task file, or a task.
     cell_size
@@ -94,6 +96,9 @@ def run(
         As for `build_graph`.
     return_to_start
         Whether the robot goes back in the end.
+    lost
+        What becomes of elements whose geometry was lost: `abort` refuses a way through their place, `box`
+        takes the box they lie in as an obstacle, `ignore` leaves them out. Or a treatment by GlobalId.
     seed
         For what is random in the simulation.
     out
@@ -105,6 +110,8 @@ def run(
     ------
     NoTargetError
         If there is nothing to do.
+    IncompleteModelError
+        If the way leads through a place where an obstacle was lost.
     UnsafePlanError
         If the independent check refuses the path; it is not returned.
     BimnavError
@@ -117,7 +124,7 @@ def run(
 
     loaded = load_task(str(task)) if isinstance(task, (str, Path)) else task
     building = model if isinstance(model, Building) else read_ifc(model, progress=progress)
-    building = building.with_targets(targets)
+    building = with_boxes(building.with_targets(targets), lost)
     environment = make_environment(building, loaded, robot, start=start)
     if not environment.targets:
         raise NoTargetError(
@@ -131,6 +138,7 @@ def run(
     _refuse_targets_outside(graph, environment)
     begin = find_start(graph, start)
     tour = plan_tour(graph, begin.cell, start_point=begin.point, return_to_start=return_to_start)
+    refuse_lost(tour, lost)
     tour, check = _checked(tour)
     result = simulate(tour, rng=np.random.default_rng(seed))
     mission = Mission(building, loaded, environment, tour.graph, begin, tour, check, result)

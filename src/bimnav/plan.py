@@ -22,8 +22,9 @@ from bimnav.errors import (
     StartBlockedError,
     ValueRangeError,
 )
-from bimnav.graph import NavGraph, Stop, Unreached
+from bimnav.graph import NavGraph
 from bimnav.grid import Cell
+from bimnav.stops import Stop, Unreached
 
 __all__ = [
     "Path",

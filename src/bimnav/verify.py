@@ -51,7 +51,7 @@ _CONTACT = ("footprint", "body", "inside", "restricted", "off-floor")
 _SLACK = 1e-9  # metres; what rounding may take from a distance
 _SAME = 1e-6  # metres; points and heights closer than this are the same
 _FLOOR_GRID = 1e-6  # metres to which corners of the floor are rounded; floats hold it to 1e9 m
-_GAP = 0.1  # metres; gaps in the floor as wide as this are driven over, and a body may overhang by it
+_GAP = 0.12  # metres; gaps in the floor are driven over, and a body may overhang: more than any planner closes
 _SKIN = 1e-4  # metres; the body in space is thinner by this: the meshes of round things have chords for arcs
 _NEAR = 1.0  # metres; how far around the body the clearance in space is measured
 _HALF_TURN = 16  # chords of half a round body; they lie inside the circle, so a touch is a true touch
@@ -440,7 +440,8 @@ def _check_floor(track: _Track, world: _World, found: list[Violation]) -> None:
     # on a grid: without one GEOS can lose polygons that differ from others by rounding alone
     floor = shapely.union_all(regions, grid_size=_FLOOR_GRID)
     grown = shapely.buffer(floor, _GAP / 2, join_style="mitre")
-    floor = shapely.buffer(grown, -_GAP / 2 + _SAME - max(world.radius - _GAP, 0.0), join_style="mitre")
+    floor = shapely.buffer(grown, -_GAP / 2, join_style="mitre")
+    floor = shapely.buffer(floor, _SAME - max(world.radius - _GAP, 0.0))
     shapely.prepare(floor)
     for leg, line in zip(track.legs, track.stretches, strict=True):
         if not shapely.covers(floor, line):

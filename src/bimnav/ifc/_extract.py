@@ -11,8 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
+from bimnav.ifc._extent import extent_of
 from bimnav.ifc._findings import Findings
 from bimnav.ifc._geometry import Geometry, read_geometry
+from bimnav.ifc._georeference import anchor_rows, georeference_row
 from bimnav.ifc._kernel import Entity, File
 from bimnav.ifc._model import Model, to_building
 from bimnav.ifc._products import BodyFinder, identify, left_out_by_class, sanitize, sorted_of
@@ -25,7 +27,7 @@ __all__ = ["Heartbeat", "extract", "to_building"]
 Heartbeat = Callable[[int, int, str], None]
 
 _CRASHED = "it crashed the geometry kernel"
-_DAMAGED = "its representation refers to nothing, or to something else than a shape"
+_DAMAGED = "its representation is empty, or refers to nothing or to something else than a shape"
 
 
 def _silent(done: int, total: int, global_id: str) -> None:
@@ -37,6 +39,7 @@ def extract(
     *,
     heartbeat: Heartbeat = _silent,
     skip: Collection[str] = (),
+    careful: bool = False,
     log: Any = None,
 ) -> Model:
     """Read a whole file.
@@ -50,9 +53,11 @@ def extract(
         An open file; its placements and representations must be free of circles.
     heartbeat
         Called with the number of products begun so far, their total, and the GlobalId of the next one
-        before the kernel touches it.
+        before the kernel touches it; empty while it touches several, or none.
     skip
         GlobalIds, as given to `heartbeat`, of products that crashed the kernel before; they are lost.
+    careful
+        Whether to give the kernel one product at a time, so that there is no doubt which one crashes it.
     log
         The in-memory `ifcopenshell.logger` the file was opened with; its errors become issues.
 
@@ -79,10 +84,12 @@ def extract(
     begun: set[int] = set()
 
     def working_on(step_id: int) -> None:
-        begun.add(step_id)
-        heartbeat(len(begun) - 1, len(wanted), ids[step_id])
+        if step_id:
+            begun.add(step_id)
+        heartbeat(max(0, len(begun) - 1), len(wanted), ids.get(step_id, ""))
 
-    geometry = read_geometry(file, wanted, solids, contexts, relations.openings_of(), working_on)
+    geometry = read_geometry(file, wanted, solids, contexts, relations.openings_of(), working_on, careful=careful)
+    heartbeat(len(wanted), len(wanted), "")
     lost = dict(sorted((lost | geometry.lost).items()))
     findings.about_geometry(geometry, lost, left_out)
     meshes, arrays, shapes = geometry.pack(product.id() for product in wanted)
@@ -93,6 +100,8 @@ def extract(
         "schema": file.schema_identifier,
         "unit": unit,
         "unit_scale": unit_scale,
+        "georeference": georeference_row(file, unit_scale, findings),
+        "anchors": anchor_rows(file, unit_scale),
         "meshes": meshes,
         **_contents(file, parts, rows, geometry, findings, storey_rows(file, ids, unit_scale)),
         "issues": findings.rows,
@@ -100,6 +109,9 @@ def extract(
             "asked": [ids[product.id()] for product in asked],
             "left_out": {ids[step_id]: rule for step_id, rule in left_out.items()},
             "lost": {ids[step_id]: reason for step_id, reason in lost.items()},
+            "lost_bounds": {
+                ids[p.id()]: box for p in asked if p.id() in lost and (box := extent_of(p, unit_scale)) is not None
+            },
         },
     }
     return Model(tables, arrays)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from bimnav.ifc._geometry import Geometry
-from bimnav.ifc._kernel import Entity
+if TYPE_CHECKING:
+    from bimnav.ifc._geometry import Geometry
+    from bimnav.ifc._kernel import Entity
 
 __all__ = ["Findings"]
 

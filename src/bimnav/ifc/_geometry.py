@@ -101,6 +101,8 @@ def read_geometry(
     contexts: set[int],
     openings: Mapping[int, Sequence[int]],
     working_on: Callable[[int], None],
+    *,
+    careful: bool = False,
 ) -> Geometry:
     """Tessellate products and cut their openings.
 
@@ -115,13 +117,16 @@ def read_geometry(
     openings
         Step id of a host to the step ids of what cuts it.
     working_on
-        Called with the step id of each product before it is touched.
+        Called with the step id of each product before it is touched; 0 before all are.
+    careful
+        Whether to touch only one at a time.
     """
-    tessellator = Tessellator(file, solids, contexts, working_on)
+    tessellator = Tessellator(file, solids, contexts, working_on, careful=careful)
     readings = tessellator.read(products)
     geometry = Geometry(meshes=tessellator.meshes)
     cutter = Cutter(geometry.meshes)
     for step_id, reading in readings.items():
+        working_on(step_id)
         for mesh in {mesh for mesh, _ in reading.shapes}:
             cutter.whole(mesh)
         reading.shapes = [shape for shape in reading.shapes if len(geometry.meshes[shape[0]].faces)]

@@ -52,17 +52,19 @@ def iterate(
     """Yield the shapes of products, each with the step ids of the products that gave none just before it.
 
     One product may have several shapes. The last of what is yielded has no shape, only the rest of those
-    without. `working_on` is called with the step id of the product that the kernel takes up next.
+    without. `working_on` is called with the step id of the product that the kernel takes up next; 0 while it
+    takes up all of several.
     """
     if not products:
         return
-    working_on(products[0].id())
+    working_on(products[0].id() if len(products) == 1 else 0)
     threads = 1  # more of them poll, and abort the process when an exception leaves the loop
     iterator = _geom.iterator(settings, file, threads, include=list(products), geometry_library=library, logger=log)
     found = iterator.initialize()
     tasks = _ifc.ifcopenshell_wrapper.iterator.get_task_products(iterator) if found else [products]
     queue = [step_id for step_id, _ in groupby(product.id() for task in tasks for product in task)]
     following = 0
+    working_on(queue[0])
     while found:
         shape = iterator.get()
         before = following

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav._georeference import Georeference
 from bimnav.building import (
     Building,
     Connector,
@@ -41,6 +42,8 @@ class Model:
         JSON values:
 
         - `project`: name; `schema`; `unit`: name of the length unit; `unit_scale`: metres per unit
+        - `georeference`: what `Georeference` takes, or None
+        - `anchors`: `{global_id: placement}` of sites, buildings and storeys, (4, 4) metres
         - `storeys`: `[{global_id, name, elevation}]`, lowest first
         - `meshes`: `[{quality}]`, one per mesh of the arrays
         - `elements`: `[{global_id, ifc_class, name, type_name, object_type, predefined_type, tag,
@@ -50,7 +53,8 @@ class Model:
         - `doors`: `[{global_id, opening, width, height}]`
         - `connectors`: `[{global_id, name, kind, parts, low, high}]`
         - `issues`: `[{code, message, global_ids, severity, hint}]`
-        - `ledger`: `{asked: [global_id], left_out: {global_id: rule}, lost: {global_id: reason}}`
+        - `ledger`: `{asked: [global_id], left_out: {global_id: rule}, lost: {global_id: reason},
+          lost_bounds: {global_id: [[x, y, z], [x, y, z]]}}`
     arrays
         - `vertices` (n, 3) float64 metres and `faces` (m, 3) int32, all meshes one after the other;
           faces count from their own mesh's first vertex
@@ -103,9 +107,16 @@ def to_building(
         openings=tuple(openings.values()),
         connectors=tuple(Connector(**row | {"parts": tuple(row["parts"])}) for row in tables["connectors"]),
         issues=tuple(Issue(**row | {"global_ids": tuple(row["global_ids"])}) for row in tables["issues"]),
-        ledger=Ledger(tuple(ledger["asked"]), dict(ledger["left_out"]), dict(ledger["lost"])),
+        ledger=Ledger(
+            tuple(ledger["asked"]),
+            dict(ledger["left_out"]),
+            dict(ledger["lost"]),
+            {global_id: np.array(box) for global_id, box in ledger["lost_bounds"].items()},
+        ),
         schema=tables["schema"],
         unit=tables["unit"],
+        georeference=Georeference(**tables["georeference"]) if tables.get("georeference") else None,
+        anchors={global_id: np.array(placement) for global_id, placement in tables.get("anchors", {}).items()},
         sources=tuple(sources),
         selector=selector,
         property_reader=property_reader,

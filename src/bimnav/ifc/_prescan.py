@@ -50,7 +50,7 @@ _END = re.compile(_GAP + rb"ENDSEC\s*+;" + _GAP + rb"END-ISO-10303-21\b", re.DOT
 _COMMENT = re.compile(rb"/\*.*?\*/", re.DOTALL)
 _NAMES_AND_COMMENTS = re.compile(rb"'[^']*'|/\*.*?\*/", re.DOTALL)
 _REFERENCE = re.compile(rb"#\s*(\d+)")
-_SEVENTH = re.compile(rb"\(\s*'[^']*'\s*,(?:\s*(?:'(?:[^']|'')*'|[^,'()]*)\s*,){5}\s*#(\d+)")
+_SEVENTH = re.compile(rb"\(\s*'([^']*)'\s*,(?:\s*(?:'(?:[^']|'')*'|[^,'()]*)\s*,){5}\s*#(\d+)")
 _WHOLE_AND_PARTS = re.compile(rb"#(\d+)\s*,\s*\(?([#\d\s,]*)\)?\s*\)\s*$")
 _PARTS_AND_WHOLE = re.compile(rb"\(([#\d\s,]*)\)\s*,\s*#(\d+)\s*\)\s*$")
 _LAST = re.compile(rb"#(\d+)\s*\)\s*$")
@@ -96,14 +96,19 @@ class Prescan:
         Metres per length unit.
     instances
         Number of entity instances.
-    products
-        Class name in capitals to the number of its instances that have a representation.
+    shaped
+        Step id to class name in capitals and GlobalId, of every product that has a representation.
     """
 
     schema: str
     unit_scale: float
     instances: int
-    products: Mapping[str, int] = field(default_factory=dict)
+    shaped: Mapping[int, tuple[str, str]] = field(default_factory=dict)
+
+    @property
+    def products(self) -> dict[str, int]:
+        """Class name in capitals to the number of its instances that have a representation."""
+        return dict(sorted(Counter(kind for kind, _ in self.shaped.values()).items()))
 
 
 def prescan(path: Path, *, beat: Callable[[int, int], None] | None = None) -> Prescan:
@@ -142,7 +147,7 @@ class _Scan:
         self.parts: dict[int, list[int]] = {}
         self.units: dict[int, tuple[bytes, bytes]] = {}
         self.shapes: set[int] = set()
-        self.candidates: list[tuple[bytes, int]] = []  # possible products and their seventh attribute
+        self.candidates: list[tuple[int, bytes, bytes, int]] = []  # number, class, GlobalId and seventh attribute
         self.placements: list[int] = []  # those in pending
 
     def run(self, beat: Callable[[int, int], None] | None) -> Prescan:
@@ -152,12 +157,12 @@ class _Scan:
         self._check_chains(self.pending, self.depth, "refers to itself")
         self._check_chains(self.parts, {}, "is a part of itself")
         scale = self._unit_scale()
-        products = Counter(
-            kind.decode("ascii", "replace")
-            for kind, shape in self.candidates
+        shaped = {
+            number: (kind.decode("ascii", "replace"), global_id.decode("ascii", "replace"))
+            for number, kind, global_id, shape in self.candidates
             if shape in self.shapes or (self.follow and shape not in self.depth and shape not in self.pending)
-        )
-        return Prescan(schema, scale, instances, dict(sorted(products.items())))
+        }
+        return Prescan(schema, scale, instances, shaped)
 
     # header
 
@@ -242,7 +247,7 @@ class _Scan:
         elif kind[:6] == b"IFCREL":
             self._note_parts(kind, body)
         elif shape := _SEVENTH.match(body):
-            self.candidates.append((kind, int(shape[1])))
+            self.candidates.append((number, kind, shape[1], int(shape[2])))
 
     def _note_parts(self, kind: bytes, body: bytes) -> None:
         pattern = _PART_OF.get(kind)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import uuid
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import ifcopenshell.guid
 
@@ -15,6 +17,7 @@ __all__ = [
     "derived_id",
     "identify",
     "is_body",
+    "is_global_id",
     "left_out_by_class",
     "sanitize",
     "sorted_of",
@@ -105,7 +108,7 @@ def identify(products: Sequence[Entity]) -> tuple[dict[int, str], list[int]]:
     """Give every product a GlobalId of its own.
 
     The first product keeps an id that several share; the others, and those whose id is not 22 characters
-    of the IFC alphabet, get one that follows from their class and step id.
+    of the IFC alphabet, get one that follows from their class, their step id and the ids of the others.
 
     Returns
     -------
@@ -117,23 +120,29 @@ def identify(products: Sequence[Entity]) -> tuple[dict[int, str], list[int]]:
     ids: dict[int, str] = {}
     for product in products:
         written = str(product.GlobalId)
-        if _GLOBAL_ID.fullmatch(written):
+        if is_global_id(written):
             ids.setdefault(product.id(), written)
     first: dict[str, int] = {}
     for step_id, written in ids.items():
         first.setdefault(written, step_id)
     renamed = []
+    file_mark = hashlib.sha256("".join(first).encode()).hexdigest()  # so that no other file derives the same
     for product in products:
         step_id = product.id()
         if first.get(ids.get(step_id, "")) == step_id:
             continue
-        text = f"{product.is_a()} #{step_id}"
+        text = f"{product.is_a()} #{step_id} of {file_mark}"
         while (new := derived_id(text)) in first:
             text += "'"
         first[new] = step_id
         ids[step_id] = new
         renamed.append(step_id)
     return ids, renamed
+
+
+def is_global_id(text: str) -> bool:
+    """Tell whether a text is 22 characters of the IFC alphabet."""
+    return _GLOBAL_ID.fullmatch(text) is not None
 
 
 def left_out_by_class(file: File) -> dict[int, str]:
@@ -157,31 +166,48 @@ class BodyFinder:
     """Finds what the bodies of products consist of; a mapped representation is looked into once."""
 
     def __init__(self) -> None:
-        self._mapped: dict[int, list[Entity]] = {}
+        self._mapped: dict[int, dict[int, Entity]] = {}
         self._is_solid: dict[str, bool] = {}  # by class: `is_a` is too slow to ask for every item
 
     def solids_of(self, product: Entity) -> tuple[list[Entity], set[int]]:
-        """Return the solids and surfaces of a product's bodies, and the step ids of the contexts they are in."""
-        solids: list[Entity] = []
+        """Return the solids and surfaces of a product's bodies, and the step ids of the contexts they are in.
+
+        Raises
+        ------
+        AttributeError, RuntimeError, TypeError
+            If its representation is empty or holds something else than shapes.
+        """
+        solids: dict[int, Entity] = {}
         contexts: set[int] = set()
-        for representation in product.Representation.Representations if product.Representation else ():
+        for representation in _some(product.Representation.Representations):
             if is_body(representation.RepresentationIdentifier):
-                found = list(self._solid_items(representation))
-                solids += found
+                found = self._solid_items(representation)
+                solids |= found
                 if found and representation.ContextOfItems is not None:
                     contexts.add(representation.ContextOfItems.id())
-        return solids, contexts
+        return list(solids.values()), contexts
 
-    def _solid_items(self, representation: Entity) -> Iterator[Entity]:
-        for item in representation.Items or ():
+    def _solid_items(self, representation: Entity) -> dict[int, Entity]:
+        found: dict[int, Entity] = {}
+        for item in _some(representation.Items):
             name = item.is_a()
             if name == "IfcMappedItem":
                 source = item.MappingSource.MappedRepresentation
                 if source.id() not in self._mapped:
-                    self._mapped[source.id()] = list(self._solid_items(source))
-                yield from self._mapped[source.id()]
+                    self._mapped[source.id()] = self._solid_items(source)
+                found |= self._mapped[source.id()]
                 continue
             if name not in self._is_solid:
+                if not item.is_a("IfcRepresentationItem"):
+                    raise TypeError(f"{name} is no shape")
                 self._is_solid[name] = any(item.is_a(solid) for solid in _SOLIDS)
             if self._is_solid[name]:
-                yield item
+                found[item.id()] = item
+        return found
+
+
+def _some(items: Any) -> tuple[Entity, ...]:
+    """Return the members of a list that may not be empty."""
+    if not isinstance(items, tuple) or not items:
+        raise TypeError(f"{items!r:.50} where shapes should be")
+    return items

@@ -115,7 +115,8 @@ class _Facets(FacetTransformer):
             return []
         if known_elsewhere:
             hint = "No element of this model can have it; name another class too, or match names."
-            return _refuse(self._query, f"names {name}, which {schema} does not have", hint, token.column)
+            what = f"names {name}, which {schema} does not have"
+            return _refuse(self._query, what, hint, token.column, schema=schema)
         if any(name in _entities_of(other) for other in SCHEMAS):
             hint = "A filter picks elements and rooms: name their classes, such as IfcDoor."
             return _refuse(self._query, f"names {name}, which is no class of products", hint, token.column)
@@ -176,9 +177,9 @@ def _nearest(name: str, known: Iterable[str]) -> str:
     return f"Did you mean {close[0]}?" if close else "Check its spelling."
 
 
-def _refuse(query: str, what: str, hint: str, column: int | None = None) -> NoReturn:
+def _refuse(query: str, what: str, hint: str, column: int | None = None, **context: str) -> NoReturn:
     where = f" (column {column})" if column else ""
-    raise SelectorError(f"filter {query!r} {what}{where}.", hint, {"query": query, "column": column})
+    raise SelectorError(f"filter {query!r} {what}{where}.", hint, {"query": query, "column": column, **context})
 
 
 def _plain(value: Any) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Protocol
 
-from bimnav.errors import IfcSchemaError, IfcSyntaxError
+from bimnav.errors import GeometryError, IfcSchemaError, IfcStructureError, IfcSyntaxError, IfcUnitsError
 from bimnav.ifc._model import Model
 from bimnav.ifc._prescan import Prescan, scan
 from bimnav.ifc._text import load
@@ -27,7 +27,15 @@ class Listener(Protocol):
         """Hear which product the kernel touches next; empty if none."""
 
 
-def read(path: Path, folder: Path, listener: Listener, *, skip: Collection[str] = (), check: bool = True) -> Model:
+def read(
+    path: Path,
+    folder: Path,
+    listener: Listener,
+    *,
+    skip: Collection[str] = (),
+    careful: bool = False,
+    check: bool = True,
+) -> Model:
     """Read one file.
 
     Parameters
@@ -40,6 +48,8 @@ def read(path: Path, folder: Path, listener: Listener, *, skip: Collection[str] 
         Told how far the work is.
     skip
         GlobalIds of products the kernel must not touch; they count as lost.
+    careful
+        Whether to give the kernel one product at a time.
     check
         Whether to look through the text first.
     """
@@ -50,14 +60,20 @@ def read(path: Path, folder: Path, listener: Listener, *, skip: Collection[str] 
     file, log = open_copy(text, folder / "model.ifc", path.name)
     del text
     from bimnav.ifc._extract import extract
+    from bimnav.ifc._gaps import broken_products, note_lost
 
     if said is not None:
         _check_parsed(file, log, said, path.name)
+    broken = broken_products(file, log)
     listener.stage("reading")
-    model = extract(file, heartbeat=listener.beat, skip=skip, log=log)
+    try:
+        model = extract(file, heartbeat=listener.beat, skip=skip, careful=careful, log=log)
+    except (IfcStructureError, IfcUnitsError) as error:  # which do not know the name
+        raise type(error)(f"{path.name}: {error.message}", error.hint, {"file": path.name, **error.context}) from error
+    except GeometryError as error:  # nobody foresaw it: as good as a crash at the product in hand
+        raise RuntimeError(str(error)) from error
     listener.stage("finishing")
-    if said is not None:
-        _close_ledger(model, said)
+    note_lost(model, file, broken, said.shaped if said else {})
     return model
 
 
@@ -96,19 +112,4 @@ def _check_parsed(file: Any, log: Any, said: Prescan, name: str) -> None:
             f"{name} holds {said.instances} entities, of which only {parsed} could be parsed.",
             "The rest would be lost without a word; ask for a fresh export.",
             {"file": name, "entities": said.instances, "parsed": parsed},
-        )
-
-
-def _close_ledger(model: Model, said: Prescan) -> None:
-    """Note it as an error if the kernel saw fewer products, or more, than the text holds."""
-    counted, asked = sum(said.products.values()), len(model.tables["ledger"]["asked"])
-    if counted != asked:
-        model.tables["issues"].append(
-            {
-                "code": "open-ledger",
-                "message": f"the text holds {counted} products with a representation, of which {asked} were looked at.",
-                "global_ids": [],
-                "severity": "error",
-                "hint": "Some are of a class that the schema does not know; export the model again.",
-            }
         )

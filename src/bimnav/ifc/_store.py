@@ -6,13 +6,17 @@ cross the border of the reading process and lie in the cache, one file a model.
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import hashlib
 import io
 import json
 import logging
 import os
 import sys
+import time
 import zipfile
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -25,11 +29,31 @@ from bimnav._files import write_bytes
 from bimnav.errors import CacheError, OutputError
 from bimnav.ifc._model import Model
 
-__all__ = ["Cache", "CacheInfo", "cache_folder", "cache_info", "clear_cache", "key_of", "pack", "unpack"]
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+__all__ = [
+    "SIZE_LIMIT",
+    "Cache",
+    "CacheInfo",
+    "cache_folder",
+    "cache_info",
+    "clear_cache",
+    "key_of",
+    "pack",
+    "unpack",
+]
+
+SIZE_LIMIT = 2 * 1024**3
+"""Bytes a cache may take; the models of some hundred large buildings."""
 
 _LOG = logging.getLogger(__name__)
 _DIGEST = hashlib.sha256().digest_size
 _SUFFIX = ".bimnav"
+_LOCKS = "locks"
+_POLL = 0.05  # seconds
 _TABLES = "tables"
 _DECIDING = ("bimnav", "ifcopenshell", "manifold3d", "numpy")  # packages that decide what a model becomes
 _ARRAYS = {  # name: kind of its numbers and its shape without the first axis
@@ -137,8 +161,8 @@ def cache_folder() -> Path:
 def cache_info(folder: Path | None = None) -> CacheInfo:
     """Count what lies in the cache."""
     folder = folder or cache_folder()
-    sizes = [path.stat().st_size for path in folder.glob(f"*{_SUFFIX}")]
-    return CacheInfo(folder, len(sizes), sum(sizes))
+    entries = _entries(folder)
+    return CacheInfo(folder, len(entries), sum(entry.size for entry in entries))
 
 
 def clear_cache(folder: Path | None = None) -> int:
@@ -172,6 +196,23 @@ def _versions() -> tuple[str, ...]:
     return (code, *(version(package) for package in _DECIDING))
 
 
+@dataclass(frozen=True, slots=True, order=True)
+class _Entry:
+    used: float
+    path: Path
+    size: int
+
+
+def _entries(folder: Path) -> list[_Entry]:
+    """List the models of a cache; other processes may add and remove some meanwhile."""
+    found = []
+    for path in folder.glob(f"*{_SUFFIX}"):
+        with contextlib.suppress(FileNotFoundError):
+            stat = path.stat()
+            found.append(_Entry(stat.st_mtime, path, stat.st_size))
+    return found
+
+
 class Cache:
     """A folder of models; whatever goes wrong with it costs time, never a result.
 
@@ -179,28 +220,90 @@ class Cache:
     ----------
     folder
         Where it is; made when first written to.
+    limit
+        Bytes it may take; beyond them the models go that were not used for the longest time.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, limit: int = SIZE_LIMIT) -> None:
+        self.folder, self.limit = folder, limit
 
     def get(self, key: str) -> Model | None:
         """Return a model, or None if there is none; a damaged one counts as none, with one warning."""
-        path = self.folder / f"{key}{_SUFFIX}"
+        path = self._path(key)
         try:
             data = path.read_bytes()
         except OSError:
             return None
         try:
-            return unpack(data)
+            model = unpack(data)
         except ValueError as error:
             _LOG.warning("the cached model %s is damaged (%s); it is read again", path, error)
             return None
+        with contextlib.suppress(OSError):
+            os.utime(path)
+        return model
 
     def put(self, key: str, data: bytes) -> None:
         """Keep a packed model; if that fails, say so in the log and go on."""
+        if len(data) > self.limit:
+            _LOG.warning("the model is not cached: it has %d bytes, and the cache %d", len(data), self.limit)
+            return
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            write_bytes(self.folder / f"{key}{_SUFFIX}", data)
+            self._make_room(len(data))
+            write_bytes(self._path(key), data)
         except (OSError, OutputError) as error:
             _LOG.warning("the model is not cached: %s", error)
+
+    @contextlib.contextmanager
+    def alone(self, key: str, patience: float, waiting: Callable[[], None]) -> Iterator[bool]:
+        """Keep other processes from reading the same model meanwhile; yield whether one did before.
+
+        Parameters
+        ----------
+        patience
+            Seconds to wait for another process that does; after them it goes on all the same.
+        waiting
+            Called now and then while it waits.
+        """
+        try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle = os.open(self.folder / _LOCKS, os.O_RDWR | os.O_CREAT, 0o600)
+        except OSError:  # a cache that cannot be written to either; `put` says so
+            yield False
+            return
+        try:
+            has_waited = False
+            deadline = time.monotonic() + patience
+            while not _has_locked(handle, int(key[:15], 16)) and time.monotonic() < deadline:
+                has_waited = True
+                waiting()
+                time.sleep(_POLL)
+            yield has_waited
+        finally:
+            os.close(handle)  # and the lock is gone, as it is when the process is killed
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}{_SUFFIX}"
+
+    def _make_room(self, size: int) -> None:
+        entries = sorted(_entries(self.folder))
+        excess = sum(entry.size for entry in entries) + size - self.limit
+        for entry in entries:
+            if excess <= 0:
+                break
+            entry.path.unlink(missing_ok=True)
+            excess -= entry.size
+
+
+def _has_locked(handle: int, byte: int) -> bool:
+    """Lock one byte of a file, which need not be so long, for this process; tell whether no other has it."""
+    try:
+        if sys.platform == "win32":
+            os.lseek(handle, byte, os.SEEK_SET)
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        else:
+            fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
+    except OSError as error:
+        return error.errno not in (errno.EACCES, errno.EAGAIN)  # else this disk knows no locks
+    return True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -61,7 +62,9 @@ class Tessellator:
     contexts
         Step ids of the representation contexts in which bodies are looked for.
     working_on
-        Called with the step id of each product before the kernel touches it.
+        Called with the step id of each product before the kernel touches it; with 0 before it touches all.
+    careful
+        Whether to give the kernel one product at a time, which is slower, and never touches all.
     """
 
     def __init__(
@@ -70,12 +73,15 @@ class Tessellator:
         solids: Mapping[int, Sequence[Entity]],
         contexts: set[int],
         working_on: Callable[[int], None],
+        *,
+        careful: bool = False,
     ) -> None:
         self.file = file
         self.meshes: list[Mesh] = []
         self._solids = solids
         self._contexts = contexts
         self._working_on = working_on
+        self._careful = careful
         self._index: dict[tuple[bytes, bytes], int] = {}
         self._known: dict[tuple[str, bool, str], tuple[int, frozenset[int]]] = {}
 
@@ -125,15 +131,16 @@ class Tessellator:
         readings = {product.id(): Reading() for product in products}
         log = new_log()
         settings = settings_for(self._contexts, openings=openings)
-        try:
-            for shape, dropped in iterate(self.file, products, library, settings, log, self._working_on):
-                _take_errors(log, readings, dropped or ([shape.id] if shape else []))
-                if shape is not None and is_body(shape.context):
-                    self._take_shape(shape, readings[shape.id], (library, openings, shape.geometry.id))
-        except RuntimeError as error:
-            for reading in readings.values():
-                if not reading.shapes:
-                    reading.errors.append(str(error))
+        for group in [[product] for product in products] if self._careful else [products]:
+            try:
+                for shape, dropped in iterate(self.file, group, library, settings, log, self._working_on):
+                    _take_errors(log, readings, dropped or ([shape.id] if shape else []))
+                    if shape is not None and is_body(shape.context):
+                        self._take_shape(shape, readings[shape.id], (library, openings, shape.geometry.id))
+            except RuntimeError as error:
+                for reading in (readings[product.id()] for product in group):
+                    if not reading.shapes:
+                        reading.errors.append(str(error))
         _share_errors(readings)
         return readings
 
@@ -173,8 +180,9 @@ class Tessellator:
         clipper = Clipper(self.file, settings_for(self._contexts)) if chained else None
         for product in chained:
             self._working_on(product.id())
-            if clipper is not None and (reading := self._clip(product, clipper)) is not None:
-                readings[product.id()] = reading
+            with suppress(GeometryError):  # out of range: the other kernel may know better
+                if clipper is not None and (reading := self._clip(product, clipper)) is not None:
+                    readings[product.id()] = reading
         return readings
 
     def _clip(self, product: Entity, clipper: Clipper) -> Reading | None:

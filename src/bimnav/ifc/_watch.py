@@ -41,6 +41,7 @@ __all__ = ["Limits", "Reading", "read_apart", "read_here"]
 _LOG = logging.getLogger(__name__)
 _QUARANTINE_LIMIT = 8
 _LONGEST_LINE = 1 << 16
+_LEAST_SILENCE = 5.0  # seconds; a busy machine may take as long to start the process
 _LEAST_MEMORY = 1024**3
 _NEARLY = 0.5  # of the memory allowed, resident at death: it died of memory
 _UNWANTED = {"PYTHONINSPECT", "PYTHONSTARTUP", "PYTHONWARNINGS"}  # meant for the caller's main program
@@ -60,7 +61,8 @@ class Limits:
     timeout
         Seconds for the whole reading.
     silence
-        Seconds for any one product; more for a large file, which takes longer to open.
+        Seconds for any one product, at most half of `timeout`; more for a large file, which takes longer
+        to open.
     memory
         Bytes of address space, where the system can limit it; None for what the machine has.
     """
@@ -72,6 +74,8 @@ class Limits:
     def __post_init__(self) -> None:
         if not (0 < self.timeout < math.inf and 0 < self.silence < math.inf):
             raise ValueRangeError(f"timeout is {self.timeout} s.", "Give a number of seconds above 0.")
+        patience = max(self.timeout / 2, _LEAST_SILENCE)  # time is left to read the file without what stalls
+        object.__setattr__(self, "silence", min(self.silence, patience))
         if self.memory is not None and not self.memory >= _LEAST_MEMORY:
             hint = f"Allow at least {_LEAST_MEMORY}; the reader alone needs half of that."
             raise ValueRangeError(f"memory is {self.memory} bytes.", hint)
@@ -103,7 +107,8 @@ def read_apart(
     """Read a file in a process of its own.
 
     A product that crashes or stalls the geometry kernel is set aside and the file is read again without
-    it, up to eight times; it is listed in the ledger as lost.
+    it, up to eight times; it is listed in the ledger as lost. If it is not known which one did, the
+    kernel gets one at a time.
 
     Parameters
     ----------
@@ -127,11 +132,16 @@ def read_apart(
     deadline = time.monotonic() + limits.timeout
     lost: dict[str, str] = {}
     repeatable = True
+    careful = False
     while True:
         try:
-            packed = _Attempt(path, limits, deadline, list(lost), report, check).run()
+            packed = _Attempt(path, limits, deadline, list(lost), careful, report, check).run()
         except (ReaderCrashError, ReaderTimeoutError) as error:
             suspect = error.context.get("suspect")
+            if suspect == "" and error.context["stage"] == "reading" and not careful:
+                careful = True
+                _LOG.info("%s: reading again, one product at a time: %s", path.name, error)
+                continue
             if not suspect or suspect in lost or len(lost) == _QUARANTINE_LIMIT:
                 raise
             stalled = isinstance(error, ReaderTimeoutError)
@@ -209,12 +219,20 @@ class _Attempt:
     """One process and what is heard from it."""
 
     def __init__(
-        self, path: Path, limits: Limits, deadline: float, skip: list[str], report: Report, check: bool
+        self,
+        path: Path,
+        limits: Limits,
+        deadline: float,
+        skip: list[str],
+        careful: bool,
+        report: Report,
+        check: bool,
     ) -> None:
         self.path, self.limits, self.deadline, self.report = path, limits, deadline, report
         self.job = {
             "path": str(path.absolute()),
             "skip": skip,
+            "careful": careful,
             "check": check,
             "seconds": math.ceil(limits.timeout) + 5,  # of one processor; meant for a worker that lost its caller
             "memory": _physical_memory() if limits.memory is None else int(limits.memory),
@@ -272,7 +290,7 @@ class _Attempt:
             if left <= 0:
                 self._fail(
                     ReaderTimeoutError,
-                    f"was not read within {self.limits.timeout:g} s",
+                    f"was not read within {self.limits.timeout:.4g} s",
                     "Allow more time (timeout=), or split the model.",
                 )
             try:
@@ -311,7 +329,7 @@ class _Attempt:
         name = _name_of(status)
         memory = self.job["memory"]
         if name == "SIGXCPU":
-            self._fail(ReaderTimeoutError, f"used up {self.limits.timeout:g} s", "Allow more time (timeout=).")
+            self._fail(ReaderTimeoutError, f"used up {self.limits.timeout:.4g} s", "Allow more time (timeout=).")
         if name == "SIGKILL" or _ALLOCATION.search(stderr) or (isinstance(memory, int) and peak > _NEARLY * memory):
             self._fail(ReaderMemoryError, "needs more memory than the reader may use", signal=name, stderr=stderr)
         self._fail(ReaderCrashError, f"crashed the reader ({name})", suspect=self.suspect, signal=name, stderr=stderr)

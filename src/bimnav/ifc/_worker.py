@@ -57,7 +57,7 @@ def main() -> None:
         from bimnav.ifc._store import pack
 
         folder = Path(job["folder"])
-        model = read(Path(job["path"]), folder, line, skip=job["skip"], check=job["check"])
+        model = read(Path(job["path"]), folder, line, skip=job["skip"], careful=job["careful"], check=job["check"])
         (folder / MODEL).write_bytes(pack(model))
         line.send(done=True)
     except BimnavError as error:
@@ -77,6 +77,8 @@ def _restrict(job: dict[str, Any]) -> None:
         import signal
 
         ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
+        with contextlib.suppress(OSError):  # if the machine runs out of memory, this process has to go
+            Path("/proc/self/oom_score_adj").write_text("1000")
     try:
         import resource
     except ImportError:  # Windows: the caller's clock is the only limit

@@ -19,9 +19,9 @@ from bimnav.sim.log import Event, EventKind, EventLog
 from bimnav.sim.track import RobotState, RobotStatus, Track, TrackRecorder
 
 if TYPE_CHECKING:
-    from bimnav.graph import Stop, Unreached
     from bimnav.grid import GridFrame
     from bimnav.plan import Tour
+    from bimnav.stops import Stop, Unreached
 
 __all__ = ["ServiceTime", "SimResult", "simulate"]
 
