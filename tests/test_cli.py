@@ -132,6 +132,15 @@ def test_inspect_accounts_for_every_product(capsys):
     assert "Ground Floor" in capsys.readouterr().out
 
 
+def test_inspect_says_what_a_robot_reaches(capsys, tmp_path):
+    assert main(["inspect", APARTMENT, "--readiness"]) == 0
+    assert "5 of   5 rooms" in capsys.readouterr().out
+    page = tmp_path / "ready.html"
+    assert main(["inspect", APARTMENT, "--html", str(page), "--radius", "0.6", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["share"]["rooms"] < 1
+    assert page.read_text().startswith("<!doctype html>")
+
+
 def test_tasks_are_listed(capsys):
     assert main(["tasks", "list"]) == 0
     assert "cleaning" in capsys.readouterr().out

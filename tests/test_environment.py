@@ -153,3 +153,11 @@ def test_a_detection_without_a_storey_lies_on_the_storey_of_the_start():
     assert bn.make_environment(building, LOOK, start=(2, 2, "High")).targets[0].storey == 1
     with_height = building.with_targets([bn.Detection("cup", 1, 1, z=3.8)])
     assert bn.make_environment(with_height, LOOK).targets[1].storey == 1
+
+
+def test_a_level_split_off_a_storey_is_called_by_its_own_name():
+    deck = box("deck", 0, 0, 2.3, 4, 6, 2.5, ifc_class="IfcSlab")
+    environment = bn.make_environment(room(8, 6, height=5, elements=[deck]), LOOK)
+    assert environment.storeys_at((1, 1, "Ground floor (+2.50 m)")) == (1,)
+    assert environment.storeys_at((1, 1, "Ground floor"))[0] == 0
+    assert set(environment.storeys_at((1, 1, "Ground floor"))) == {0, 1}

@@ -56,7 +56,13 @@ if TYPE_CHECKING:
         plan_tour as plan_tour,
     )
     from bimnav.plot import plot_environment as plot_environment, plot_graph as plot_graph, plot_tour as plot_tour
-    from bimnav.readiness import Readiness as Readiness
+    from bimnav.readiness import (
+        DoorCheck as DoorCheck,
+        Readiness as Readiness,
+        RoomCheck as RoomCheck,
+        StoreyCheck as StoreyCheck,
+        doors_of as doors_of,
+    )
     from bimnav.robot import Robot as Robot
     from bimnav.samples import list_samples as list_samples, sample as sample
     from bimnav.sim import SimResult as SimResult, simulate as simulate
@@ -82,7 +88,7 @@ _HOMES = {
     "bimnav.mission": "Mission run",
     "bimnav.plan": "Path Tour distance_field distance_matrix find_path order_stops plan_tour",
     "bimnav.plot": "plot_environment plot_graph plot_tour",
-    "bimnav.readiness": "Readiness",
+    "bimnav.readiness": "DoorCheck Readiness RoomCheck StoreyCheck doors_of",
     "bimnav.robot": "Robot",
     "bimnav.samples": "list_samples sample",
     "bimnav.sim": "SimResult simulate",

@@ -22,7 +22,8 @@ __all__ = ["Doorway", "doorway_of", "measured"]
 _SIDESTEPS = (0.05, 0.25, 0.5)  # metres from the wall at which a room is looked for, the nearest first
 _BELOW = 1.0  # metres; a floor farther below a door is not the one it opens to
 _ABOVE = 0.35  # metres; a floor finish may lie this much above the bottom of an opening
-_SLIVER, _EDGE = 1e-9, 1e-9  # square metres in plan view; share of a side
+_SLIVER, _EDGE = 1e-9, 1e-9  # metres or square metres in plan view; share of a side
+_SHEET = 1e-3  # metres
 _PLATE = 1.5  # a plan view this many times longer than wide shows which way a leaf lies
 
 
@@ -108,14 +109,28 @@ def _points_of(product: Element | Opening) -> NDArray[np.float64]:
 
 
 def _plan_of(product: Element | Opening) -> Plan | None:
-    """Return center, (2, 2) directions and (2,) lengths of the smallest rectangle around a product in plan view."""
-    rectangle = shapely.minimum_rotated_rectangle(shapely.MultiPoint(_points_of(product)))
-    if rectangle.geom_type != "Polygon" or rectangle.is_empty:
+    """Return center, (2, 2) directions and (2,) lengths of the smallest rectangle around a product in plan view.
+
+    A sheet on edge has the width of its millimetre.
+    """
+    points = _points_of(product)
+    if not len(points):
         return None
-    a, b, c = shapely.get_coordinates(rectangle)[:3]
+    origin = points.mean(axis=0)
+    rectangle = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shapely.MultiPoint(points - origin)))
+    if len(rectangle) == 2:  # a line
+        aside = (rectangle[1] - rectangle[0])[::-1] * (-1, 1)
+        rectangle = np.array(
+            [rectangle[0], rectangle[1], rectangle[1] + aside / max(np.hypot(*aside), _SLIVER) * _SHEET]
+        )
+    if len(rectangle) < 3:
+        return None
+    a, b, c = rectangle[:3]
     sides = np.array([a - b, c - b])
     lengths = np.hypot(*sides.T)
-    return (a + c) / 2, sides / lengths[:, None], lengths
+    if not (lengths > _SLIVER).all():
+        return None
+    return (a + c) / 2 + origin, sides / lengths[:, None], lengths
 
 
 def measured(building: Building) -> tuple[Door, ...]:

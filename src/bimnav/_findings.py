@@ -31,6 +31,7 @@ _PLACEHOLDER = re.compile(
     r"|1900-12-31(t[\d:]+)?|unbekannt|undefiniert",
     re.IGNORECASE,
 )
+_ROOMS_AT = {"inside": 2, "outside": 1, "nowhere": 0}
 _LOOKED_AT = 40  # products whose properties are read in search of placeholders
 _LEAST = 3  # placeholders that make a habit
 _RECORDED = ("IfcFurn", "IfcFlow", "IfcDoor", "IfcSanitary", "IfcSystemFurniture", "IfcBuildingElementProxy")
@@ -62,8 +63,8 @@ def findings(
     if building.spaces:
         yield from issue(
             "door-without-room",
-            "{n} doors have floor on both sides, but rooms on one side or none.",
-            (door.global_id for door in doors if door.leads == "inside" and len(door.spaces) < 2),
+            "{n} doors touch no room, or have floor on both sides and a room on one alone.",
+            (door.global_id for door in doors if len(door.spaces) < _ROOMS_AT[door.leads]),
             "Model the rooms or corridors that they open to.",
             "info",
         )
@@ -86,7 +87,7 @@ def _is_furniture(element: Any) -> bool:
 
 def _islands(environment: IndoorEnvironment, reach: Reach) -> Iterable[Issue]:
     """Tell of parts of the floor that hold no room and that the robot does not reach."""
-    d, (x0, y0) = reach.graph.frame.cell_size, reach.graph.frame.origin
+    d, (x0, y0) = reach.frame.cell_size, reach.frame.origin
     for storey in range(len(environment.levels)):
         in_rooms = {part for room in reach.rooms.values() if room.storey == storey for part in room.parts}
         for part in reach.parts_on(storey):

@@ -26,7 +26,7 @@ FloorSource: TypeAlias = Literal["space", "slab", "covering", "landing", "hull",
 FLOOR_SOURCES: tuple[FloorSource, ...] = ("space", "slab", "covering", "landing", "hull", "door", "passage")
 """What may say that there is floor indoors."""
 
-_LEAST_FLOOR = 1.0  # square metres; a slab with less is a marker or a plinth, not a level
+_LEAST_FLOOR = 2.0  # square metres; a slab with less is a marker, a plinth or a tread, not a level
 _LEAST_VOID = 0.1  # square metres; a smaller hole under a room is where slabs meet badly
 _NARROW = 0.2  # metres; a gap between slabs as narrow as this is a joint
 _SEAM = 0.04  # metres; what rooms and walls leave over is no floor if it is no wider

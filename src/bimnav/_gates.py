@@ -226,7 +226,9 @@ class Gates:
         if within:
             names = listed(o.name or o.ifc_class for o in within)
             return "blocked", f"blocked by {names}", tuple(o.global_id for o in within)
-        return "cells", f"it is {way.width:.2f} m wide; smaller cells may show the way", ()
+        spare = 100 * (way.width - 2 * robot.radius)
+        cell = f" of {self.graph.frame.cell_size:g} m" if self.graph else ""
+        return "cells", f"it leaves {spare:.0f} cm beside the robot; cells{cell} are too large to show the way", ()
 
 
 def listed(names: Iterable[str], most: int = 3) -> str:

@@ -18,6 +18,7 @@ __all__ = ["Shell", "filled", "opened", "outline", "part_in"]
 
 _WALLS = ("IfcWall", "IfcCurtainWall", "IfcPlate", "IfcMember", "IfcWindow", "IfcColumn")
 _CUT = (1.2, 1.5)  # metres above a floor: over parapets and railings, through windows, under lintels
+_SILL = 0.1  # metres above a floor
 _JOINT = 0.25  # metres; a gap in a facade up to twice as wide is bad joinery, not a way out
 _ENCLOSED = 0.5  # share of what the hull of the walls holds; walls that enclose less do not enclose
 
@@ -62,8 +63,8 @@ class Shell:
         return not (self._walls or self._rooms)
 
     def walls(self, level: float) -> BaseGeometry:
-        """Return the plan of the walls, windows and columns on a floor."""
-        return part_in(self._walls, level + _CUT[0], level + _CUT[1])
+        """Return the plan of the walls, windows and columns that stand on a floor, down to their sills."""
+        return part_in(self._walls, level + _SILL, level + _CUT[1])
 
     def inside(self, level: float) -> BaseGeometry:
         """Return the plan of all that walls or rooms enclose on a floor, walls included.
@@ -73,7 +74,7 @@ class Shell:
         low, high = level + _CUT[0], level + _CUT[1]
         holes = [way.rectangle() for way in self._holes if way.bottom < high and way.top > low]
         rest = (part_in(shapes, low, high) for shapes in (self._rest, self._rooms))
-        walls = self.walls(level)
+        walls = part_in(self._walls, low, high)
         ring = shapely.buffer(unite([walls, *holes, *rest]), _JOINT, join_style="mitre")
         inside = shapely.buffer(filled(ring), -_JOINT, join_style="mitre")
         hull = shapely.convex_hull(walls)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict, deque
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
@@ -16,7 +18,7 @@ from bimnav._gates import DoorCheck, Gates, listed
 from bimnav.building import Door, Element
 from bimnav.footprint import unite
 from bimnav.graph import NavGraph
-from bimnav.grid import rasterize
+from bimnav.grid import GridFrame, rasterize
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -84,8 +86,20 @@ def obstruction(reason: str, detail: str, culprits: Iterable[str] = ()) -> Obstr
     return Obstruction(reason, detail, _HINTS.get(reason, ""), tuple(dict.fromkeys(culprits)))
 
 
+def _widened(frame: GridFrame, margin: int) -> GridFrame:
+    return replace(
+        frame,
+        first_row=frame.first_row - margin,
+        first_col=frame.first_col - margin,
+        rows=frame.rows + 2 * margin,
+        cols=frame.cols + 2 * margin,
+    )
+
+
 class Reach:
     """What a robot reaches on every level, coming from the largest part of each.
+
+    Its cells are those of the graph, with a margin where the middle of the robot cannot be but its body can.
 
     Parameters
     ----------
@@ -100,8 +114,11 @@ class Reach:
     def __init__(
         self, graph: NavGraph, gates: Gates, checks: Sequence[DoorCheck], connectors: Sequence[Ascent]
     ) -> None:
-        self.graph, self.environment = graph, gates.environment
-        self.parts = graph.components
+        self.environment = gates.environment
+        margin = math.ceil(self.environment.robot.radius / graph.frame.cell_size) + 1
+        self.frame = _widened(graph.frame, margin)
+        self.parts = np.pad(graph.components, ((0, 0), (margin, margin), (margin, margin)))
+        self._floor = np.pad(graph.floor, ((0, 0), (margin, margin), (margin, margin)))
         self.sizes = np.bincount(self.parts.ravel())
         self.sizes[0] = 0
         self.main = [int(level.flat[self.sizes[level].argmax()]) for level in self.parts]
@@ -110,7 +127,7 @@ class Reach:
     @cached_property
     def usable(self) -> tuple[Mask, ...]:
         """(rows, cols) bool for each level: floor that nothing stands on, however large the robot is."""
-        frame, environment = self.graph.frame, self.environment
+        frame, environment = self.frame, self.environment
         everywhere = shapely.box(*frame.bounds)
         masks = []
         for storey in range(len(environment.levels)):
@@ -124,7 +141,7 @@ class Reach:
         """(rows, cols) bool for each level: usable floor that the robot's body gets to."""
         from scipy import ndimage
 
-        reach = self.environment.robot.radius / self.graph.frame.cell_size + 0.5
+        reach = self.environment.robot.radius / self.frame.cell_size + 0.5
         masks = []
         for level, main, usable in zip(self.parts, self.main, self.usable, strict=True):
             near = ndimage.distance_transform_edt(level != main) <= reach if main else np.zeros_like(usable)
@@ -133,11 +150,11 @@ class Reach:
 
     def area(self, cells: Mask) -> float:
         """Return the area of cells, square metres."""
-        return float(np.count_nonzero(cells) * self.graph.frame.cell_size**2)
+        return float(np.count_nonzero(cells) * self.frame.cell_size**2)
 
     def cells_in(self, polygon: BaseGeometry) -> tuple[Window, Mask]:
         """Return the cells whose middle lies in a polygon: a window of rows and columns, and a mask of it."""
-        frame = self.graph.frame
+        frame = self.frame
         x0, y0, x1, y1 = np.array(polygon.bounds) / frame.cell_size
         cols = slice(max(int(x0) - frame.first_col - 1, 0), max(int(x1) - frame.first_col + 2, 0))
         rows = slice(max(int(y0) - frame.first_row - 1, 0), max(int(y1) - frame.first_row + 2, 0))
@@ -168,7 +185,7 @@ class Reach:
     def parts_on(self, storey: int) -> list[int]:
         """Return the numbers of the parts of a level, the largest first; pockets between furniture do not count."""
         present = np.unique(self.parts[storey])
-        wide = present[self.sizes[present] * self.graph.frame.cell_size**2 >= _LEAST_PART]
+        wide = present[self.sizes[present] * self.frame.cell_size**2 >= _LEAST_PART]
         parts: list[int] = wide[np.argsort(-self.sizes[wide], kind="stable")].tolist()
         return parts
 
@@ -249,7 +266,7 @@ class Reach:
         if not (self._without_furniture[storey] & cells).any():
             return None
         rows, cols = np.nonzero(cells)
-        d, (x0, y0) = self.graph.frame.cell_size, self.graph.frame.origin
+        d, (x0, y0) = self.frame.cell_size, self.frame.origin
         tree = shapely.STRtree(shapely.points(x0 + (cols + 0.5) * d, y0 + (rows + 0.5) * d))
         movable = ((o, body) for o, body in self.environment.bodies_on(storey) if not o.ifc_class.startswith(_FIXED))
         near = [o for o, body in movable if len(tree.query(body, predicate="dwithin", distance=2 * d))]
@@ -264,7 +281,7 @@ class Reach:
         masks = []
         for storey, main in enumerate(self.main):
             fixed = [b for o, b in self.environment.bodies_on(storey) if o.ifc_class.startswith(_FIXED)]
-            labels = ndimage.label(self.graph.floor[storey] & ~rasterize(self.graph.frame, fixed))[0]
+            labels = ndimage.label(self._floor[storey] & ~rasterize(self.frame, fixed))[0]
             masks.append((labels == labels[self.parts[storey] == main][0]) & bool(main))
         return tuple(masks)
 

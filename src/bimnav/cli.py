@@ -109,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
         help="elements whose geometry was lost: refuse a way through their place, take their box as an obstacle, "
         "or leave them out (default: abort)",
     )
+    run.add_argument("--outdoors", action="store_true", help="floor outside the walls counts, too")
     run.add_argument("--return", dest="return_to_start", action="store_true", help="go back to the start in the end")
     run.add_argument("--seed", type=int, default=0, help="for what is random (default: 0)")
     run.add_argument("--out", metavar="DIR", help="write figures, tables and the report here")
@@ -117,6 +118,10 @@ def _parser() -> argparse.ArgumentParser:
 
     inspect = commands.add_parser("inspect", help="say what a model holds, and what is wrong with it")
     inspect.add_argument("models", nargs="+", metavar="MODEL.ifc", help="one file, or several of one building")
+    inspect.add_argument("--readiness", action="store_true", help="say which rooms and doors a robot reaches")
+    inspect.add_argument("--html", metavar="FILE", help="write the readiness report as a page")
+    inspect.add_argument("--radius", type=_length, default=0.25, help="of that robot (default: 0.25)")
+    inspect.add_argument("--height", type=_length, default=1.0, help="of that robot (default: 1)")
     inspect.add_argument("--json", action="store_true")
     inspect.set_defaults(command=_inspect)
 
@@ -176,6 +181,7 @@ def _run(options: argparse.Namespace) -> int:
         on_conflict=options.on_conflict,
         return_to_start=options.return_to_start,
         lost=options.lost,
+        outdoors=options.outdoors,
         seed=options.seed,
         out=options.out,
     )
@@ -225,7 +231,10 @@ def _summary(report: dict[str, Any], *, is_point: bool) -> str:
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    report = bn.inspect(bn.read_ifc(options.models))
+    building = bn.read_ifc(options.models)
+    if options.readiness or options.html:
+        return _readiness(building, options)
+    report = bn.inspect(building)
     if options.json:
         _print_json(report)
         return _DONE
@@ -245,6 +254,34 @@ def _inspect(options: argparse.Namespace) -> int:
         )
     _print("\n".join(lines))
     return _DONE
+
+
+def _readiness(building: bn.Building, options: argparse.Namespace) -> int:
+    from bimnav._files import write_text
+
+    ready = building.readiness(bn.Robot(radius=options.radius, height=options.height))
+    if options.html:
+        write_text(options.html, ready.to_html())
+    if options.json:
+        _print_json(ready.to_dict())
+    else:
+        _print(_readiness_summary(ready))
+        if options.html:
+            _print(f"  wrote    {options.html}")
+    return _DONE
+
+
+def _readiness_summary(ready: bn.Readiness) -> str:
+    lines = [f"{ready.building}, for a robot of radius {ready.robot.radius:g} m and height {ready.robot.height:g} m"]
+    lines += [
+        f"  {storey.name:<24} {storey.rooms_reached:3d} of {storey.rooms:3d} rooms  "
+        f"{storey.reached_area:8.1f} of {storey.floor_area:8.1f} m2  "
+        f"{storey.doors_connecting:3d} of {storey.doors:3d} doors"
+        for storey in ready.storeys
+        if storey.floor_area
+    ]
+    lines += [f"  not reached: {room.name} ({room.global_id}): {room.detail} {room.hint}" for room in ready.unreached]
+    return "\n".join(lines)
 
 
 def _tasks(options: argparse.Namespace) -> int:

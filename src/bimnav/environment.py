@@ -220,16 +220,21 @@ class IndoorEnvironment:
         Parameters
         ----------
         place
-            `(x, y)` or `(x, y, storey)`: metres, and the name, GlobalId or index of a storey. Best are
-            storeys with floor there, then those with an obstacle there, then the lowest walkable one.
+            `(x, y)` or `(x, y, storey)`: metres, and the name, GlobalId or index of a storey, or the name
+            of one level of it, such as `Level 1 (+1.50 m)`. Best are storeys with floor there, then those
+            with an obstacle there, then the lowest walkable one.
         """
         if not all(math.isfinite(float(value)) for value in place[:2]):
             raise ValueRangeError(f"({place[0]}, {place[1]}) is not a point.", "Give finite metres.")
         point = shapely.Point(*place[:2])
         storeys: Sequence[int] = range(len(self.levels))
         if len(place) > 2 and place[2] is not None:
-            named = self.building.storeys[self.building.storey_index(place[2])].global_id
-            storeys = [s for s in storeys if self.storeys[s].global_id == named]
+            split = [s for s in storeys if self.storeys[s] not in self.building.storeys]
+            named = [s for s in split if self.storeys[s].name == place[2]]
+            if not named:
+                global_id = self.building.storeys[self.building.storey_index(place[2])].global_id
+                named = [s for s in storeys if self.storeys[s].global_id == global_id]
+            storeys = named
         on = [s for s in storeys if self.floor(s).intersects(point)]
         within = [s for s in storeys if any(body.intersects(point) for _, body in self.bodies_on(s))]
         walkable = [s for s in (self.ground, *storeys) if s in storeys and not self.floor(s).is_empty]

@@ -68,6 +68,7 @@ def run(
     refine: Literal["auto"] | None = None,
     on_conflict: Literal["approach", "reach"] = "approach",
     return_to_start: bool = False,
+    outdoors: bool = False,
     lost: Lost | Mapping[str, Lost] = "abort",
     seed: int = 0,
     out: str | Path | None = None,
@@ -96,6 +97,8 @@ def run(
         As for `build_graph`.
     return_to_start
         Whether the robot goes back in the end.
+    outdoors
+        Whether floor outside the walls counts, too.
     lost
         What becomes of elements whose geometry was lost: `abort` refuses a way through their place, `box`
         takes the box they lie in as an obstacle, `ignore` leaves them out. Or a treatment by GlobalId.
@@ -125,7 +128,7 @@ def run(
     loaded = load_task(str(task)) if isinstance(task, (str, Path)) else task
     building = model if isinstance(model, Building) else read_ifc(model, progress=progress)
     building = with_boxes(building.with_targets(targets), lost)
-    environment = make_environment(building, loaded, robot, start=start)
+    environment = make_environment(building, loaded, robot, start=start, outdoors=outdoors)
     if not environment.targets:
         raise NoTargetError(
             f"task {loaded.name!r} finds no target in {building.name!r}.",

@@ -15,7 +15,7 @@ from bimnav.building import Building, Issue
 from bimnav.environment import IndoorEnvironment, make_environment
 from bimnav.errors import GridTooLargeError, NothingWalkableError
 from bimnav.footprint import unite
-from bimnav.graph import NavGraph, build_graph
+from bimnav.graph import build_graph
 from bimnav.robot import Robot
 from bimnav.tasks import Task
 
@@ -178,16 +178,13 @@ def readiness(building: Building, robot: Robot | None = None, *, cell_size: floa
     """
     robot = robot or Robot(radius=0.25)
     environment = make_environment(building, Task("readiness", "where a robot can go"), robot)
-    graph = _graph_of(environment, cell_size)
-    gates = Gates(environment, graph)
-    doors = tuple(gates.check(door) for door in building.doors)
     connectors = describe_connectors(building)
-    reach = None if graph is None else Reach(graph, gates, doors, connectors)
+    reach, doors = _tried(environment, cell_size, connectors)
     rooms = tuple(_rooms(environment, reach))
     return Readiness(
         building.name,
         robot,
-        cell_size if graph is None else graph.frame.cell_size,
+        cell_size if reach is None else reach.frame.cell_size,
         tuple(_storeys(environment, reach, rooms, doors)),
         rooms,
         doors,
@@ -197,13 +194,19 @@ def readiness(building: Building, robot: Robot | None = None, *, cell_size: floa
     )
 
 
-def _graph_of(environment: IndoorEnvironment, cell_size: float) -> NavGraph | None:
+def _tried(
+    environment: IndoorEnvironment, cell_size: float, connectors: Sequence[Ascent]
+) -> tuple[Reach | None, tuple[DoorCheck, ...]]:
+    """Cut the environment into cells, larger ones if they would be too many, and try its doors."""
     try:
-        return build_graph(environment, cell_size=cell_size)
-    except GridTooLargeError as error:
-        return build_graph(environment, cell_size=error.context["fits"])
+        graph = build_graph(environment, cell_size=cell_size)
+        gates = Gates(environment, graph)
+        doors = tuple(gates.check(door) for door in environment.building.doors)
+        return Reach(graph, gates, doors, connectors), doors
     except NothingWalkableError:
-        return None
+        return None, doors_of(environment)
+    except GridTooLargeError as error:
+        return _tried(environment, 1.05 * error.context["fits"], connectors)  # a little more, for the margin of `Reach`
 
 
 def _rooms(environment: IndoorEnvironment, reach: Reach | None) -> Iterable[RoomCheck]:
