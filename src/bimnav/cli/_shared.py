@@ -1,0 +1,40 @@
+"""What the commands share: exit codes, arguments with units, printing."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from bimnav.detections import parse_length, parse_place, parse_target
+from bimnav.errors import BimnavError
+
+if TYPE_CHECKING:
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+DONE, BUG, BAD_INPUT, INCOMPLETE, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def argument(read: Callable[[str], Any], name: str) -> Callable[[str], Any]:
+    def convert(text: str) -> Any:
+        try:
+            return read(text)
+        except BimnavError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    convert.__name__ = name
+    return convert
+
+
+length = argument(parse_length, "length")
+place = argument(parse_place, "place")
+target = argument(parse_target, "target")
+
+
+def show(text: str) -> None:
+    print(text)  # noqa: T201
+
+
+def show_json(value: Any) -> None:
+    show(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
