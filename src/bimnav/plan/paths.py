@@ -1,0 +1,257 @@
+"""Paths and distances on a navigation graph."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bimnav import search
+from bimnav.errors import (
+    GoalBlockedError,
+    InputError,
+    NoPathError,
+    OutsideMapError,
+    StartBlockedError,
+    ValueRangeError,
+)
+from bimnav.graph import NavGraph
+from bimnav.grid import Cell
+
+__all__ = ["Algorithm", "Engine", "Path", "distance_field", "distance_matrix", "find_path", "free_index"]
+
+Algorithm = Literal["auto", "astar", "dijkstra"]
+Engine = Literal["compiled", "rustworkx"]
+
+_PROVED = 1e-9  # relative; a smaller gap is rounding
+
+_layouts: WeakKeyDictionary[NavGraph, search.Layout] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A walk over neighboring cells.
+
+    Parameters
+    ----------
+    indices : (n, 3) int32
+        Storey, row and column of every cell, from start to goal.
+    length
+        Metres.
+    cost
+        What was made least: every step's length times the mean of its cells' multipliers, metres.
+    """
+
+    graph: NavGraph
+    indices: NDArray[np.int32]
+    length: float
+    cost: float
+
+    def __post_init__(self) -> None:
+        self.indices.flags.writeable = False
+
+    def __repr__(self) -> str:
+        start, goal = (Cell(*self.indices[k].tolist()) for k in (0, -1))
+        return f"Path({start} to {goal}, {len(self.indices)} cells, {self.length:.3f} m)"
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """The cells, from start to goal."""
+        return tuple(Cell(*index) for index in self.indices.tolist())
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """(n, 3) float64, the middles of the cells in world coordinates, metres."""
+        points = self.graph.frame.centers_of(self.indices)
+        points.flags.writeable = False
+        return points
+
+
+def find_path(
+    graph: NavGraph,
+    start: Cell,
+    goal: Cell,
+    *,
+    algorithm: Algorithm = "auto",
+    engine: Engine = "compiled",
+) -> Path:
+    """Find a cheapest path.
+
+    Among equally cheap paths the choice is fixed, so equal inputs give equal outputs.
+
+    Parameters
+    ----------
+    graph
+        Graph to search.
+    start, goal
+        Cells to join. A cell joined to itself is a path of one cell and length 0.
+    algorithm
+        Search to run; all return a cheapest path. A* looks at fewer cells than Dijkstra's; `auto` takes
+        jump points, which look at fewer still, where all cells cost the same and have eight neighbors.
+    engine
+        `compiled` searches the arrays; `rustworkx` searches the graph written out, hundreds of times
+        slower: a second opinion. Which of several cheapest paths they return may differ.
+
+    Returns
+    -------
+    path
+        Adjacent cells from start to goal; no step cuts a blocked corner.
+
+    Raises
+    ------
+    OutsideMapError
+        If a cell is not one of the graph's.
+    StartBlockedError, GoalBlockedError
+        If a cell is blocked.
+    NoPathError
+        If no walk over free cells joins the two.
+    """
+    if algorithm not in ("auto", "astar", "dijkstra"):
+        raise ValueRangeError(f"algorithm is {algorithm!r}.", "Give 'auto', 'astar' or 'dijkstra'.")
+    if engine not in ("compiled", "rustworkx"):
+        raise ValueRangeError(f"engine is {engine!r}.", "Give 'compiled' or 'rustworkx'.")
+    begin = free_index(graph, start, "start")
+    end = free_index(graph, goal, "goal")
+    if engine == "rustworkx":
+        return _find_explicit(graph, begin, end, algorithm)
+    found = search.find(_layout(graph), begin, end, algorithm)
+    if found is None:
+        raise _no_path(graph, begin, end)
+    d = graph.frame.cell_size
+    return Path(graph, found.indices, found.length * d, found.cost * d)
+
+
+def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[np.float64]:
+    """Find the distance from the nearest source to every cell.
+
+    Parameters
+    ----------
+    graph
+        Graph to search.
+    sources
+        One free cell or several.
+
+    Returns
+    -------
+    distance : (storeys, rows, cols) float64
+        Metres; where cells have multipliers, the cost of a cheapest path. inf where no path leads.
+
+    Raises
+    ------
+    OutsideMapError, StartBlockedError
+        If a source lies outside the map or is blocked.
+    """
+    cells = [sources] if isinstance(sources, Cell) else list(sources)
+    if not cells:
+        raise InputError("a distance field needs a source.", "Give at least one free cell.")
+    index = np.array([free_index(graph, cell, "start") for cell in cells])
+    return search.distances(_layout(graph), index, graph.frame.cell_size)
+
+
+def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float64]:
+    """Find the distances between all pairs of cells.
+
+    Parameters
+    ----------
+    graph
+        Graph to search.
+    cells
+        May repeat, and may be blocked.
+
+    Returns
+    -------
+    distance : (n, n) float64
+        From row to column as in `distance_field`; inf where no path leads, which holds for blocked cells.
+
+    Raises
+    ------
+    OutsideMapError
+        If a cell is not one of the graph's.
+    """
+    index = np.array([_index(graph, cell, "cell") for cell in cells], dtype=np.int64)
+    matrix = np.full((len(index), len(index)), np.inf)
+    np.fill_diagonal(matrix, 0.0)
+    free = np.flatnonzero(np.isfinite(graph.cost.ravel()[index]))
+    matrix[np.ix_(free, free)] = search.distances_between(_layout(graph), index[free], graph.frame.cell_size)
+    return matrix
+
+
+def _layout(graph: NavGraph) -> search.Layout:
+    layout = _layouts.get(graph)
+    if layout is None:
+        layout = _layouts[graph] = search.Layout(graph.cost, graph.connectivity)
+    return layout
+
+
+def _index(graph: NavGraph, cell: Cell, role: str) -> int:
+    storey, row, col = cell
+    storeys, rows, cols = graph.cost.shape
+    if not (0 <= storey < storeys and 0 <= row < rows and 0 <= col < cols):
+        raise OutsideMapError(
+            f"{role} {cell} lies outside the map.",
+            f"The map has {storeys}, {rows} and {cols} storeys, rows and columns; `graph.frame.cell_at` finds cells.",
+            {role: tuple(cell)},
+        )
+    return int((storey * rows + row) * cols + col)
+
+
+def free_index(graph: NavGraph, cell: Cell, role: Literal["start", "goal"]) -> int:
+    """Return the flat index of a free cell."""
+    index = _index(graph, cell, role)
+    if graph.cost.item(index) == math.inf:
+        error = StartBlockedError if role == "start" else GoalBlockedError
+        raise error(f"{role} {cell} is blocked.", _nearest_free(graph, cell), {role: tuple(cell)})
+    return index
+
+
+def _nearest_free(graph: NavGraph, cell: Cell) -> str:
+    free = np.argwhere(graph.free[cell.storey])
+    if not len(free):
+        return "No cell of its storey is free."
+    row, col = free[((free - (cell.row, cell.col)) ** 2).sum(axis=1).argmin()].tolist()
+    return f"The nearest free cell is {Cell(cell.storey, row, col)}."
+
+
+def _cell(graph: NavGraph, index: int) -> Cell:
+    storey, row, col = (int(k) for k in np.unravel_index(index, graph.cost.shape))
+    return Cell(storey, row, col)
+
+
+def _no_path(graph: NavGraph, begin: int, end: int) -> NoPathError:
+    start, goal = _cell(graph, begin), _cell(graph, end)
+    return NoPathError(
+        f"no path from {start} to {goal}; both cells must be free and connected",
+        "",
+        {"start": tuple(start), "goal": tuple(goal)},
+    )
+
+
+def _find_explicit(graph: NavGraph, begin: int, end: int, algorithm: Algorithm) -> Path:
+    """Search the graph written out, with callables that run no Python code."""
+    import rustworkx
+
+    layout, d = _layout(graph), graph.frame.cell_size
+    if algorithm == "dijkstra":
+        to_go = (0.0).__mul__
+    else:
+        _, row, col = np.abs(np.indices(graph.cost.shape) - np.array(_cell(graph, end)).reshape(3, 1, 1, 1))
+        plan = row + col - (2 - math.sqrt(2)) * np.minimum(row, col) * (graph.connectivity == 8)
+        to_go = (plan * (d * layout.least * layout.shrink * (1 - _PROVED))).ravel().tolist().__getitem__
+    explicit = graph._explicit
+    try:
+        nodes = rustworkx.astar_shortest_path(explicit, begin, end.__eq__, float, to_go)
+    except rustworkx.NoPathFound as error:
+        raise _no_path(graph, begin, end) from error
+    flat = np.array(list(nodes), dtype=np.int64)
+    indices = np.stack(np.unravel_index(flat, graph.cost.shape), axis=1).astype(np.int32)
+    steps = np.abs(np.diff(indices, axis=0)).sum(axis=1)
+    length = d * (float((steps == 1).sum()) + float((steps == 2).sum()) * math.sqrt(2))
+    cost = math.fsum(explicit.get_edge_data(a, b) for a, b in pairwise(nodes))
+    return Path(graph, indices, length, cost)
