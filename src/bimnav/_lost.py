@@ -82,7 +82,7 @@ def refuse_lost(tour: Tour, how: Lost | Mapping[str, Lost]) -> None:
             met.append(element)  # it may be anywhere
             continue
         (x0, y0, low), (x1, y1, high) = bounds
-        is_in_band = any(low < z + robot.height and high > z + robot.step_height for z in heights)
+        is_in_band = any(low < z + robot.height and high > z + robot.low for z in heights)
         if is_in_band and any(way.distance(shapely.box(x0, y0, x1, y1)) <= robot.radius for way in ways):
             met.append(element)
     if met:

@@ -356,7 +356,7 @@ def _obstacles(
 ) -> Iterable[Obstacle]:
     shapes = [(element, why, shape) for element, why in candidates for shape in element.shapes]
     for storey in walkable:
-        low, high = levels[storey] + robot.step_height, levels[storey] + robot.height
+        low, high = levels[storey] + robot.low, levels[storey] + robot.height
         parts: dict[str, list[Footprint]] = {}
         for (element, _, _), part in zip(shapes, footprints_of([s for _, _, s in shapes], low, high), strict=True):
             if part is not None and not part.polygon.is_empty:

@@ -285,7 +285,7 @@ def _surroundings(environment: IndoorEnvironment, ignore: Collection[str]) -> _W
         [(first[r.storey], r.polygon) for r in environment.regions if _is_sound(r.polygon)],
         [(first[z.storey], z.polygon, (z.global_id, z.name)) for z in closed if _is_sound(z.polygon)],
         robot.radius,
-        (robot.step_height, robot.height),
+        (robot.low, robot.height),
         [element for element, _ in boxes],
         np.array([box for _, box in boxes]).reshape(-1, 2, 3),
         [_refusal("unknown-shape", f"the shape of {_who(x)} is empty or not finite", None, 0.0, x) for x in lost],
