@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from itertools import count, pairwise
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 from tests.conftest import REPOSITORY
 from tests.ifc_text import FOOTER, HEADER
 
-__all__ = ["BASES", "Draft", "arguments", "base_text", "draft_of"]
+__all__ = ["BASES", "Draft", "arguments", "base_text", "draft_of", "listed"]
 
 # drafts
 
@@ -29,6 +29,11 @@ def arguments(text: str) -> list[str]:
         else:
             parts[-1] += sign
     return parts
+
+
+def listed(numbers: Iterable[int]) -> str:
+    """Step ids as a list of references."""
+    return f"({','.join(f'#{number}' for number in numbers)})"
 
 
 class Draft:
@@ -55,6 +60,10 @@ class Draft:
         wanted = re.compile("|".join(kinds).replace("*", r"\w*"))
         return [number for number, parts in self.entities.items() if wanted.fullmatch(parts[0])]
 
+    def first(self, kind: str) -> int:
+        """The first entity of a class."""
+        return next(number for number, parts in self.entities.items() if parts[0] == kind)
+
     def products(self) -> list[int]:
         """Step ids of all entities that have a representation."""
         shapes = {f"#{number}" for number in self.all("IFCPRODUCTDEFINITIONSHAPE")}
@@ -68,14 +77,16 @@ class Draft:
     def relate(self, kind: str, *values: object) -> int:
         return self.add(kind, f"'{self.last:022d}'", "$", "$", "$", *values)
 
+    def shape(self, product: int) -> int:
+        """The first representation of a product."""
+        return _first(self[_first(self[product][7])][3])
+
     def body(self, product: int) -> int:
         """The first item of the first representation of a product."""
-        shape = _first(self[int(self[product][7][1:])][3])
-        return _first(self[shape][4])
+        return _first(self[self.shape(product)][4])
 
     def set_body(self, product: int, item: int) -> None:
-        shape = _first(self[int(self[product][7][1:])][3])
-        self[shape][4] = f"(#{item})"
+        self[self.shape(product)][4] = f"(#{item})"
 
     def lines(self) -> list[str]:
         return [f"#{number}={kind}({','.join(inner)});" for number, (kind, *inner) in self.entities.items()]

@@ -74,7 +74,7 @@ def extract(
     relations = Relations.of(file)
     findings = Findings(ids)
     taken_out = [step_id for step_id in open_circles(file, relations.circular) if step_id in ids]
-    findings.about_file(renamed, sanitize(products), taken_out, log)
+    findings.about_file(renamed, sanitize(products), taken_out, relations.malformed, log)
 
     asked = [product for product in products if product.Representation]
     no_part = left_out_by_class(file)

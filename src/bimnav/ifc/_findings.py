@@ -56,8 +56,15 @@ class Findings:
             }
         )
 
-    def about_file(self, renamed: Sequence[int], starred: Sequence[Entity], circular: Sequence[int], log: Any) -> None:
-        """Note what is wrong with identities and text, and what the parser said."""
+    def about_file(
+        self,
+        renamed: Sequence[int],
+        starred: Sequence[Entity],
+        circular: Sequence[int],
+        malformed: Sequence[int],
+        log: Any,
+    ) -> None:
+        """Note what is wrong with identities, text and relations, and what the parser said."""
         self.add(
             "bad-global-id",
             "{n} products have a GlobalId that is empty, malformed or taken; they got others, listed here.",
@@ -76,6 +83,13 @@ class Findings:
             dict.fromkeys(circular),
             hint="Repair the aggregation in the authoring tool.",
         )
+        if malformed:
+            steps = ", ".join(f"#{step_id}" for step_id in [*dict.fromkeys(malformed)][:_EXAMPLES])
+            self.add(
+                "malformed-relation",
+                f"relations join something else than entities ({steps}); what they say of it was left out.",
+                hint="The file may be damaged; export it again.",
+            )
         said = [message for message in (log.log_messages() if log else ()) if message.severity >= log.LOG_ERROR]
         errors = [" ".join(str(message.message).split()) for message in said]
         if errors:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
 from bimnav.ifc._extent import extent_of
@@ -15,6 +16,9 @@ from bimnav.ifc._products import derived_id, identify, is_body, is_global_id, so
 __all__ = ["broken_products", "note_lost"]
 
 _DANGLING = re.compile(r"Instance reference #(\d+) used by instance #(\d+) at attribute index (\d+)")
+_STATEMENT = re.compile(rb"#\s*+(\d++)\s*+=[^;]*+;")
+_TOKEN = re.compile(rb"'[^']*+'|/\*.*?\*/|[()]|[^(),'\s]++", re.DOTALL)
+_HOLE = re.compile(rb"(?<=[(,])\s*+(?:\([^()'$*]*+[$*]|[$*]\s*+,\s*+\()")  # perhaps: $ in a list within a list
 _PLACEMENT, _BODY = "5", "6"  # attributes of every product
 _GEOMETRY = (
     "IfcObjectPlacement",
@@ -26,11 +30,13 @@ _GEOMETRY = (
 )
 
 
-def broken_products(file: Any, log: Any) -> dict[int, str]:
-    """Find the products whose body or placement refers to what the parser could not give.
+def broken_products(file: Any, text: bytes, log: Any) -> dict[int, str]:
+    """Find the products whose body or placement lacks what the parser could not give.
 
     Parameters
     ----------
+    text
+        What was parsed.
     log
         What the parser had to say.
 
@@ -41,8 +47,12 @@ def broken_products(file: Any, log: Any) -> dict[int, str]:
     """
     reasons: dict[int, str] = {}
     waiting: deque[tuple[Any, str]] = deque()
-    for message in log.log_messages():
-        if found := _DANGLING.match(str(message.message)):
+    messages = [str(message.message) for message in log.log_messages()]
+    for number in _torn(text, has_complained=any("ggregate" in message for message in messages)):
+        with suppress(RuntimeError):  # not even its class is known
+            waiting.append((file.by_id(number), f"a list in #{number} has members that cannot be read"))
+    for message in messages:
+        if found := _DANGLING.match(message):
             missing, user, attribute = found.groups()
             entity, reason = file.by_id(int(user)), f"it refers to #{missing}, which is not there or cannot be read"
             if not entity.is_a("IfcProduct"):
@@ -59,6 +69,35 @@ def broken_products(file: Any, log: Any) -> dict[int, str]:
             users = sorted(file.get_inverse(entity), key=lambda user: int(user.id()))
             waiting.extend((user, reason) for user in users)
     return reasons
+
+
+def _torn(text: bytes, *, has_complained: bool) -> Iterator[int]:
+    """Yield the numbers of entities with a list whose members are missing or of several kinds.
+
+    The parser drops such members: without a word if they are missing, else it complains, but not of what.
+    """
+    if has_complained:
+        statements = _STATEMENT.finditer(text)
+    else:
+        starts = (text.rfind(b";", 0, match.start()) + 1 for match in _HOLE.finditer(text))
+        statements = (match for start in starts if (match := _STATEMENT.search(text, start)))
+    yield from dict.fromkeys(int(match[1]) for match in statements if _is_torn(match[0]))
+
+
+def _is_torn(statement: bytes) -> bool:
+    lists: list[set[bytes]] = [set()]
+    for token in _TOKEN.findall(statement):
+        if token == b"(":
+            lists.append(set())
+        elif token != b")":
+            lists[-1].add(b"0" if token[:1] in b"+-0123456789" else token[:1])
+        elif len(lists) > 1:
+            kinds = lists.pop() - {b"/"}
+            has_types = any(kind.isalpha() for kind in kinds)  # as in (#1,IFCPARAMETERVALUE(0.))
+            if len(lists) > 1 and (kinds & {b"$", b"*"} or (len(kinds) > 1 and not has_types)):
+                return True
+            lists[-1].add(token)
+    return False
 
 
 def _is_of_a_body(entity: Any) -> bool:

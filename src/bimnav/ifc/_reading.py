@@ -58,13 +58,13 @@ def read(
     said = scan(text, path.name, beat=lambda *_: listener.stage("checking")) if check else None
     listener.stage("opening")
     file, log = open_copy(text, folder / "model.ifc", path.name)
-    del text
     from bimnav.ifc._extract import extract
     from bimnav.ifc._gaps import broken_products, note_lost
 
     if said is not None:
         _check_parsed(file, log, said, path.name)
-    broken = broken_products(file, log)
+    broken = broken_products(file, text, log)
+    del text
     listener.stage("reading")
     try:
         model = extract(file, heartbeat=listener.beat, skip=skip, careful=careful, log=log)

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
+
+from ifcopenshell import entity_instance
 
 from bimnav.ifc._kernel import Entity, File
 from bimnav.ifc._products import sorted_of
 
 __all__ = ["Relations", "open_circles"]
+
+_INSTANCE: Any = entity_instance
 
 
 @dataclass(slots=True)
@@ -32,6 +37,8 @@ class Relations:
         Whole to its parts.
     circular
         Relations, with the product, that would make a product a part of itself; they do not count.
+    malformed
+        Step ids of relations that join something else than entities; what they say of it does not count.
     """
 
     container: dict[int, int] = field(default_factory=dict)
@@ -41,6 +48,7 @@ class Relations:
     kind: dict[int, Entity] = field(default_factory=dict)
     parts: dict[int, list[int]] = field(default_factory=lambda: defaultdict(list))
     circular: list[tuple[Entity, Entity]] = field(default_factory=list)
+    malformed: list[int] = field(default_factory=list)
     _up: dict[int, set[int]] = field(default_factory=lambda: defaultdict(set))
 
     @classmethod
@@ -53,29 +61,36 @@ class Relations:
             for relation in sorted_of(file, name):
                 self._join(self.whole, relation, relation.RelatedObjects, relation.RelatingObject)
         for relation in sorted_of(file, "IfcRelVoidsElement"):
-            self._join(self.voids, relation, [relation.RelatedOpeningElement], relation.RelatingBuildingElement)
+            self._join(self.voids, relation, (relation.RelatedOpeningElement,), relation.RelatingBuildingElement)
         for relation in sorted_of(file, "IfcRelFillsElement"):
-            self._join(self.fills, relation, [relation.RelatedBuildingElement], relation.RelatingOpeningElement)
+            self._join(self.fills, relation, (relation.RelatedBuildingElement,), relation.RelatingOpeningElement)
         for relation in sorted_of(file, "IfcRelDefinesByType"):
-            for product in relation.RelatedObjects or ():
-                if relation.RelatingType is not None:
-                    self.kind.setdefault(product.id(), relation.RelatingType)
+            kind = relation.RelatingType
+            for product in self._entities(relation, relation.RelatedObjects):
+                if isinstance(kind, _INSTANCE) and kind.is_a("IfcTypeObject"):
+                    self.kind.setdefault(product.id(), kind)
         for part in sorted(self.whole):
             self.parts[self.whole[part]].append(part)
         return self
 
-    def _join(self, into: dict[int, int], relation: Entity, many: Iterable[Entity] | None, one: Entity | None) -> None:
-        if one is None:
+    def _join(self, into: dict[int, int], relation: Entity, many: object, one: object) -> None:
+        if not (ones := self._entities(relation, (one,))):
             return
-        above = self._all_above(one.id())
-        for each in many or ():
-            if each is None:
-                continue
+        whole = ones[0].id()
+        above = self._all_above(whole)
+        for each in self._entities(relation, many):
             if each.id() in above:
                 self.circular.append((relation, each))
                 continue
-            self._up[each.id()].add(one.id())
-            into.setdefault(each.id(), one.id())
+            self._up[each.id()].add(whole)
+            into.setdefault(each.id(), whole)
+
+    def _entities(self, relation: Entity, values: object) -> list[Entity]:
+        """Return what a relation joins; a damaged one may hold texts and numbers."""
+        found = [each for each in values if isinstance(each, _INSTANCE)] if isinstance(values, tuple) else []
+        if not isinstance(values, tuple) or len(found) < len(values):
+            self.malformed.append(relation.id())
+        return found
 
     def _all_above(self, step_id: int) -> set[int]:
         seen, waiting = set(), [step_id]

@@ -23,6 +23,7 @@ __all__ = ["Reading", "Tessellator"]
 
 _FARTHEST = 1e8  # metres from the origin
 _LARGE = 100  # faces; the fast kernel makes smaller meshes alike in every run, and 600 are not
+_FEW = 50  # products; so many are soon set up one by one, and then it is known which one stalls
 _STEP_ID = re.compile(r"#(\d+)=")
 
 
@@ -131,7 +132,8 @@ class Tessellator:
         readings = {product.id(): Reading() for product in products}
         log = new_log()
         settings = settings_for(self._contexts, openings=openings)
-        for group in [[product] for product in products] if self._careful else [products]:
+        singly = self._careful or (library == THOROUGH and len(products) <= _FEW)
+        for group in [[product] for product in products] if singly else [products]:
             try:
                 for shape, dropped in iterate(self.file, group, library, settings, log, self._working_on):
                     _take_errors(log, readings, dropped or ([shape.id] if shape else []))

@@ -61,8 +61,8 @@ class Limits:
     timeout
         Seconds for the whole reading.
     silence
-        Seconds for any one product, at most half of `timeout`; more for a large file, which takes longer
-        to open.
+        Seconds for any one product, at most a third of `timeout`; more for a large file, which takes
+        longer to open.
     memory
         Bytes of address space, where the system can limit it; None for what the machine has.
     """
@@ -74,7 +74,7 @@ class Limits:
     def __post_init__(self) -> None:
         if not (0 < self.timeout < math.inf and 0 < self.silence < math.inf):
             raise ValueRangeError(f"timeout is {self.timeout} s.", "Give a number of seconds above 0.")
-        patience = max(self.timeout / 2, _LEAST_SILENCE)  # time is left to read the file without what stalls
+        patience = max(self.timeout / 3, _LEAST_SILENCE)  # time is left to read the file without what stalls
         object.__setattr__(self, "silence", min(self.silence, patience))
         if self.memory is not None and not self.memory >= _LEAST_MEMORY:
             hint = f"Allow at least {_LEAST_MEMORY}; the reader alone needs half of that."
