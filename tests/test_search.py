@@ -19,7 +19,7 @@ from bimnav.search import compiled, lengths
 from bimnav.search.workspace import workspace
 
 ROOT = math.sqrt(2)
-NO_LINKS = ((), (), ())
+NO_LINKS = (), ()
 STRAIGHT = [(0, 1), (1, 0), (0, -1), (-1, 0)]
 DIAGONAL = [(1, 1), (1, -1), (-1, -1), (-1, 1)]
 
@@ -28,7 +28,7 @@ def plain_dijkstra(cost, connectivity, links, source):
     """Return the cost of reaching every cell, by the book."""
     _, rows, cols = cost.shape
     joined: dict[int, list[tuple[int, float]]] = {}
-    for a, b, length in zip(*links, strict=True):
+    for (a, b), length in zip(*links, strict=True):
         joined.setdefault(int(a), []).append((int(b), float(length)))
 
     def is_free(storey, row, col):
@@ -88,7 +88,7 @@ def random_cost(rng, *, storeys=1, largest=24, kind="uniform"):
 
 def random_links(rng, cost, count, lengths_=(0.0, 0.3, 1.0, 2.5, 7.123)):
     free = np.flatnonzero(np.isfinite(cost))
-    return rng.choice(free, count), rng.choice(free, count), rng.choice(lengths_, count)
+    return rng.choice(free, (count, 2)), rng.choice(lengths_, count)
 
 
 def assert_is_walk(found, cost, connectivity, links, start, goal):
@@ -98,7 +98,7 @@ def assert_is_walk(found, cost, connectivity, links, start, goal):
     flat = (indices[:, 0] * rows + indices[:, 1]) * cols + indices[:, 2]
     assert (flat[0], flat[-1]) == (start, goal)
     shortcuts: dict[tuple[int, int], float] = {}
-    for a, b, length in zip(*links, strict=True):
+    for (a, b), length in zip(*links, strict=True):
         shortcuts[int(a), int(b)] = min(float(length), shortcuts.get((int(a), int(b)), math.inf))
     total = 0.0
     for k, (a, b) in enumerate(pairwise(map(tuple, indices))):
@@ -120,7 +120,7 @@ def test_all_searches_find_a_cheapest_path_by_a_plain_dijkstra(connectivity, kin
     for trial in range(60):
         cost = random_cost(rng, storeys=1 + trial % 3, largest=14, kind=kind)
         links = random_links(rng, cost, trial % 5)
-        layout = search.Layout(cost, connectivity, links)
+        layout = search.Layout(cost, connectivity, *links)
         start, *goals = rng.choice(np.flatnonzero(np.isfinite(cost)), 5)
         best = plain_dijkstra(cost, connectivity, links, start)
         assert_allclose(search.distances(layout, np.array([start]), 1.0).ravel(), best, rtol=1e-9, atol=1e-12)
@@ -182,7 +182,7 @@ def test_a_path_a_field_and_a_matrix_give_the_same_number_to_the_last_bit():
 
 def test_a_one_way_link_counts_in_its_direction_only():
     cost = np.ones((2, 3, 3), dtype=np.float32)
-    layout = search.Layout(cost, 8, ([4], [13], [2.0]))
+    layout = search.Layout(cost, 8, [(4, 13)], [2.0])
     assert not layout.is_symmetric
     assert_array_equal(search.distances_between(layout, np.array([4, 13]), 1.0), [[0, 2], [math.inf, 0]])
     down = search.find(layout, 4, 13)
@@ -194,7 +194,7 @@ def test_a_one_way_link_counts_in_its_direction_only():
 
 def test_a_link_may_be_a_shortcut_on_its_own_storey():
     cost = np.ones((1, 1, 50), dtype=np.float32)
-    layout = search.Layout(cost, 8, ([10, 40], [40, 10], [1.0, 1.0]))
+    layout = search.Layout(cost, 8, [(10, 40), (40, 10)], [1.0, 1.0])
     assert layout.shrink < 0.1
     for algorithm in ("auto", "astar", "dijkstra"):
         found = search.find(layout, 0, 49, algorithm)
@@ -202,14 +202,42 @@ def test_a_link_may_be_a_shortcut_on_its_own_storey():
         assert found.length == 10 + 1 + 9
 
 
+def test_a_link_at_a_blocked_cell_is_closed():
+    cost = np.ones((2, 2, 2), dtype=np.float32)
+    cost[1, 0, 0] = math.inf
+    for links in ([(0, 4)], [(4, 0)]):
+        layout = search.Layout(cost, 8, links, [1.0])
+        assert search.find(layout, 0, 5) is None
+        assert search.find(layout, 5, 0) is None
+        assert search.components(np.isfinite(cost), links).ravel().tolist() == [1, 1, 1, 1, 0, 2, 2, 2]
+
+
 def test_links_cost_what_they_say_where_floor_costs_more():
     cost = np.full((1, 1, 9), 3.0, dtype=np.float32)
-    layout = search.Layout(cost, 8, ([0], [8], [20.0]))
+    layout = search.Layout(cost, 8, [(0, 8)], [20.0])
     for algorithm in ("auto", "astar"):
         found = search.find(layout, 0, 8, algorithm)
         assert found is not None
         assert (found.length, found.cost) == (20.0, 20.0)
     assert_allclose(search.distances(layout, np.array([0]), 1.0)[0, 0, -1], 20.0, rtol=1e-11)
+
+
+def test_components_are_what_fields_reach():
+    rng = np.random.default_rng(9)
+    for trial in range(40):
+        cost = random_cost(rng, storeys=1 + trial % 3)
+        links, lengths_ = random_links(rng, cost, trial % 4)
+        links, lengths_ = np.vstack([links, links[:, ::-1]]), np.tile(lengths_, 2)
+        labels = search.components(np.isfinite(cost), links)
+        assert labels.dtype == np.int32
+        assert_array_equal(labels == 0, np.isinf(cost))
+        found, first = np.unique(labels[labels > 0], return_index=True)
+        assert found.tolist() == list(range(1, len(found) + 1))
+        assert first.tolist() == sorted(first), "numbers follow the first cell of each component"
+        layout = search.Layout(cost, 4, links, lengths_)
+        for source in rng.choice(np.flatnonzero(labels), 3):
+            reached = np.isfinite(search.distances(layout, np.array([source]), 1.0))
+            assert_array_equal(reached, labels == labels.flat[source])
 
 
 def test_a_map_without_free_cells_and_a_map_of_one_cell_are_maps():

@@ -1,8 +1,19 @@
 """Compiled searches on arrays: nothing here knows a type of bimnav."""
 
+from bimnav.search.components import components
 from bimnav.search.engine import Found, distances, distances_between, find
 from bimnav.search.layout import Layout
 from bimnav.search.ordering import Ordering, order_rows
 from bimnav.search.warmup import warmup
 
-__all__ = ["Found", "Layout", "Ordering", "distances", "distances_between", "find", "order_rows", "warmup"]
+__all__ = [
+    "Found",
+    "Layout",
+    "Ordering",
+    "components",
+    "distances",
+    "distances_between",
+    "find",
+    "order_rows",
+    "warmup",
+]

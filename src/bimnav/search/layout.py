@@ -167,9 +167,10 @@ class Layout:
         Multiplier of the length of a step; inf where blocked.
     connectivity
         4 or 8.
-    links : (from, to, length)
-        Extra one-way edges between free cells, with their lengths in cells: two arrays of flat indexes
-        into `cost`, and one of floats. Multipliers do not apply to them.
+    links : (k, 2) int
+        Extra one-way edges, from and to, as flat indexes into `cost`; one at a blocked cell is closed.
+    link_costs : (k,) float
+        What a link costs, in cells; at least 0. Multipliers do not apply to links.
 
     Attributes
     ----------
@@ -189,7 +190,8 @@ class Layout:
         self,
         cost: NDArray[np.float32],
         connectivity: int = 8,
-        links: tuple[ArrayLike, ArrayLike, ArrayLike] = ((), (), ()),
+        links: ArrayLike | None = None,
+        link_costs: ArrayLike | None = None,
     ) -> None:
         self.shape = cost.shape
         storeys, rows, cols = cost.shape
@@ -203,9 +205,11 @@ class Layout:
         self.is_uniform = self.least == self.greatest
         self.steps: NDArray[np.int64] = np.array(ROW_STEP) * self.stride + np.array(COL_STEP)
         self.turns, self.covered = _TURNS[connectivity], _COVERED[connectivity]
-        origin, end = (self.padded(np.asarray(ends, dtype=np.int64)) for ends in links[:2])
-        order = np.lexsort((end, origin))
-        length = np.asarray(links[2], dtype=np.float64)[order]
+        origin, end = self.padded(np.asarray(() if links is None else links, dtype=np.int64).reshape(-1, 2).T)
+        length = np.asarray(() if link_costs is None else link_costs, dtype=np.float64)
+        order = np.lexsort((length, end, origin))
+        order = order[np.isfinite(self.cost[origin[order]]) & np.isfinite(self.cost[end[order]])]
+        length = length[order]
         self.links: Links = origin[order].astype(np.int32), end[order].astype(np.int32), length
         self.moves[self.links[0]] |= HUB
 
