@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from bimnav.robot import Robot as Robot
     from bimnav.samples import list_samples as list_samples, sample as sample
     from bimnav.sim import SimResult as SimResult, simulate as simulate
-    from bimnav.stops import Stop as Stop, Unreached as Unreached
+    from bimnav.stops import Stand as Stand, Stop as Stop, Unreached as Unreached
     from bimnav.tasks import Rule as Rule, Task as Task, list_tasks as list_tasks, load_task as load_task
     from bimnav.verify import Check as Check, check_path as check_path, check_plan as check_plan
 
@@ -78,7 +78,7 @@ _HOMES = {
     "bimnav.environment": "IndoorEnvironment Obstacle Region Target Zone make_environment",
     "bimnav.errors": "BimnavError",
     "bimnav.graph": "Conflict NavGraph NodeKind build_graph",
-    "bimnav.stops": "Stop Unreached",
+    "bimnav.stops": "Stand Stop Unreached",
     "bimnav.grid": "Cell GridFrame rasterize",
     "bimnav.ifc": "read_ifc",
     "bimnav.inspection": "inspect",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bimnav.environment import Target
     from bimnav.graph import NavGraph
 
-__all__ = ["Stop", "Unreached", "standing_at", "stop_at", "why_not_served"]
+__all__ = ["Stand", "Stop", "Unreached", "standing_at", "stop_at", "why_not_served"]
 
 Approach = Literal["center", "standing", "reach"]
 
@@ -30,6 +30,27 @@ _PARTITIONS = (
     "IfcPlate",
     "IfcWindow",
 )
+
+
+class Stand(NamedTuple):
+    """One place from which a target is served.
+
+    Parameters
+    ----------
+    cell
+        Where the search ends.
+    end
+        Where the robot comes to stand, metres.
+    distance
+        From `end` to the target's destination, metres.
+    heading
+        Which way the robot faces there, radians counter-clockwise from x; None where it does not matter.
+    """
+
+    cell: Cell
+    end: tuple[float, float, float]
+    distance: float = 0.0
+    heading: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +70,11 @@ class Stop:
         `reach`: on it although its cell is blocked, as in the paper.
     distance
         From `end` to `destination`, metres.
+    heading
+        Which way the robot faces, radians counter-clockwise from x; None where it does not matter.
+    candidates
+        Every place from which the target may be served, best first; the stop's own among them. A planner
+        may choose any, by `at`.
     """
 
     global_id: str
@@ -59,6 +85,16 @@ class Stop:
     approach: Approach = "center"
     distance: float = 0.0
     source: Literal["model", "user"] = "model"
+    heading: float | None = None
+    candidates: tuple[Stand, ...] = ()
+
+    def __post_init__(self) -> None:
+        own = Stand(self.cell, self.end, self.distance, self.heading)
+        object.__setattr__(self, "candidates", tuple(self.candidates) or (own,))
+
+    def at(self, stand: Stand) -> Stop:
+        """Return the stop served from another of its candidates."""
+        return replace(self, cell=stand.cell, end=stand.end, distance=stand.distance, heading=stand.heading)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
