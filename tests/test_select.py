@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from bimnav._select import select_by_hand
-from bimnav.building import Building, Element, Space, Storey
+from bimnav.building import Building, Element, Facts, Space, Storey
 from bimnav.errors import FileMissingError, InputError, SelectorError
 from bimnav.ifc import read_ifc
+from bimnav.ifc._federate import federate
 from tests.conftest import real_model
 from tests.ifc_text import box, model
 
@@ -198,3 +199,32 @@ def test_a_file_that_changed_or_went_is_not_asked(tmp_path: Path):
     path.unlink()
     with pytest.raises(FileMissingError, match="gone"):
         gone.select("IfcWall")
+
+
+def test_the_facts_of_products_are_read_from_files_of_several_exporters():
+    electrical = read_ifc(real_model("duplex/Ifc2s3_Duplex_Electrical.ifc"))
+    lamps = [e for e in electrical if any(c.code == "D5020220" for c in electrical.facts(e.global_id).classifications)]
+    assert lamps
+    assert {c.system for e in lamps for c in electrical.facts(e.global_id).classifications} == {"UniFormat"}
+    heating = read_ifc(real_model("mep/b03_heating_with_building_blenderBIM.ifc"))
+    systems = {name for element in heating for name in heating.facts(element.global_id).systems}
+    assert {"Heizung_RL", "Heizung_VL"} <= systems
+
+
+def test_own_properties_are_told_apart_from_those_of_the_type():
+    house = read_ifc(real_model("houses/SampleHouse4.ifc"))
+    couch = house.facts("3cUkl32yn9qRSPvBJVyYGp")
+    assert [(c.system, c.code) for c in couch.classifications] == [("Uniformat", "E2020200")]
+    assert couch.type_properties["Identity Data"]["Assembly Code"] == "E2020200"
+    assert "Assembly Code" not in couch.properties.get("Identity Data", {})
+    assert house.facts("nobody") == Facts()
+
+
+def test_several_models_tell_the_facts_of_one_product_together():
+    duplex, handover = (
+        read_ifc(real_model(f"duplex/{name}.ifc")) for name in ("Duplex_A_20110907", "2012-03-23-Duplex-Handover")
+    )
+    table = "2kvhekJrnDjRw0CDkKW$KL"
+    facts = federate([duplex, handover]).facts(table)
+    assert any(code.code.startswith("23-40 20 14 17 24") for code in facts.classifications)
+    assert {*duplex.facts(table).properties, *handover.facts(table).properties} == set(facts.properties)

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bimnav.building import Building, Element, Mesh, Shape, Space, Storey
+from bimnav.building import Building, Classification, Element, Facts, Mesh, Shape, Space, Storey
+from bimnav.environment import make_environment
 from bimnav.errors import (
     FileKindError,
     FileMissingError,
@@ -17,7 +18,7 @@ from bimnav.errors import (
     SelectorError,
     TaskError,
 )
-from bimnav.tasks import Rule, Task, list_tasks, load_task, match, task_schema
+from bimnav.tasks import Rule, Standoff, Task, list_tasks, load_task, match, task_schema
 from tests.conftest import real_model
 
 # what a robot that cleans is to find: names as exporters write them
@@ -424,12 +425,14 @@ def test_all_mistakes_are_told_at_once_each_with_its_line(tmp_path):
         "1: schema = 2: should be 1.",
         "2: unknown key 'colour' in the file; known are schema, tasks.",
         "4: tasks.a.description = 5: should be a text in quotes.",
-        "5: tasks.a.destination = 'centre': should be 'center' or 'nearest_free'.",
+        "5: tasks.a.destination = 'centre': should be 'center', 'nearest_free', 'standoff' or 'space'; "
+        "did you mean 'center'?",
         "6: unknown key 'targts' in tasks.a; did you mean 'targets'?",
         "8: unknown key 'filtr' in tasks.a.targets[0]; did you mean 'filter'?",
         "9: tasks.a.targets[0].words = 'spill': should be a list.",
         "10: unknown key 'factor' in tasks.a.targets[0]; "
-        "known are filter, words, exclude_words, label, storeys, spaces, expect.",
+        "known are filter, words, exclude_words, label, storeys, spaces, use, classification, properties, systems, "
+        "expect, destination, service_time, priority, due, abilities.",
         "12: tasks.a.targets[1].words = ['--']: '--' is not a word. A word has letters or digits.",
         "15: tasks.a.targets[1].expect = 'many': should be a comparison with a whole number, such as '>=1'.",
         "16: tasks.a.targets[1].filter = '': should not be empty.",
@@ -537,3 +540,214 @@ def test_every_key_of_the_schema_says_what_it_is():
 def test_pydantic_is_loaded_only_when_a_file_is_read():
     script = "import sys, bimnav.tasks as t; t.Task('a', targets=[t.Rule()]); assert 'pydantic' not in sys.modules"
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+# what rules may ask for beside words
+
+
+def told(**facts):
+    """Return a building of four things, a heating system and two rooms, and what its file says of them."""
+    known = {
+        "sofa": Facts(
+            {"Pset_Asset": {"Condition": "Good", "SerialNumber": "SerialNumber"}},
+            {"Identity Data": {"OmniClass Number": "23.40.20.14.14.14", "OmniClass Title": "Settees, Sofas"}},
+            (Classification("Uniformat", "E2020200", "Furniture & Accessories"),),
+        ),
+        "table": Facts(classifications=(Classification("", "23-40 20 14 17 24: Coffee Tables"),)),
+        "valve": Facts(
+            {"Pset_Valve": {"Size": 25.0, "IsOpen": True, "Status": ["Existing", "Kept"]}},
+            {"Pset_Valve": {"Size": 15.0, "TestPressure": "16"}},
+            (Classification("NL/SfB (4 cijfers)", "24.11"), Classification("Uniclass 2015", "Pr_65_53_24")),
+            ("Heizung_VL", "HEATING"),
+        ),
+    } | facts
+    return Building(
+        "flat",
+        (Storey("s", "Ground", 0.0),),
+        elements=(
+            Element("sofa", "IfcFurniture", "Sofa", shapes=(box(1, 1, 0),)),
+            Element("table", "IfcFurniture", "Table", shapes=(box(6, 1, 0),)),
+            Element("valve", "IfcValve", "V-1", space="wc"),
+            Element("plain", "IfcWall", "Wall"),
+        ),
+        spaces=(
+            Space("living", "101", "Living room", shapes=(box(0, 0, 0, 4),)),
+            Space("wc", "102", "WC", object_type="Sanitary"),
+        ),
+        facts_reader=lambda global_id: known.get(global_id, Facts()),
+    )
+
+
+def picks(**asked):
+    return [product.global_id for product, _ in match(Rule("IfcProduct", **asked), told())]
+
+
+@pytest.mark.parametrize(
+    ("sought", "found"),
+    [
+        ("23.40.20", ["sofa", "table"]),
+        ("23-40 20 14", ["sofa", "table"]),
+        ("OmniClass: 23 40 20 14 17", ["table"]),
+        ("OmniClass:23.40", ["sofa", "table"]),
+        ("Uniformat: 23", []),
+        ("Uniformat: e20", ["sofa"]),
+        ("UniFormat II: E2020", ["sofa"]),
+        ("NL/SfB: 24", ["valve"]),
+        ("NL-SfB: 24.1", ["valve"]),
+        ("Uniclass: pr 65 53", ["valve"]),
+        ("Uniclass: Pr_40", []),
+        ("Settees", ["sofa"]),
+        ("coffee tables", ["table"]),
+        ("Table", []),
+        ("3.40", []),
+    ],
+)
+def test_a_classification_fits_by_the_beginning_of_its_code_or_words_of_its_title(sought, found):
+    assert picks(classification=[sought]) == found
+
+
+def test_one_of_several_classifications_is_enough():
+    assert picks(classification=["NL/SfB: 24", "Settees"]) == ["sofa", "valve"]
+
+
+@pytest.mark.parametrize(
+    ("condition", "found"),
+    [
+        ("Pset_Asset.Condition = 'good'", ["sofa"]),
+        ("*.Condition != ''", ["sofa"]),
+        ("*.SerialNumber != ''", []),  # its value is but its own name
+        ("*.SerialNumber = ''", ["sofa", "table", "valve", "plain", "living", "wc"]),
+        ("Pset_Valve.Size >= 25", ["valve"]),  # its own size, not its type's
+        ("Pset_Valve.Size < 25", []),
+        ("pset_valve.size = 25", ["valve"]),
+        ("Pset_*.TestPressure > 15.5", ["valve"]),  # its type's: it has none of its own
+        ("*.IsOpen = true", ["valve"]),
+        ("*.IsOpen = false", []),
+        ("*.Status = Existing", ["valve"]),
+        ("*.Status != 'Existing'", ["sofa", "table", "plain", "living", "wc"]),
+        ("'Identity Data'.'OmniClass Title' *= sofa", ["sofa"]),
+        ('Identity Data.OmniClass Title = "Settees, Sofas"', ["sofa"]),
+    ],
+)
+def test_conditions_look_at_own_properties_before_those_of_the_type(condition, found):
+    assert picks(properties=[condition]) == found
+
+
+def test_all_conditions_must_hold():
+    assert picks(properties=["*.IsOpen = true", "*.Size > 20"]) == ["valve"]
+    assert picks(properties=["*.IsOpen = true", "*.Size > 30"]) == []
+
+
+@pytest.mark.parametrize("bad", ["", "Size > 5", "*.Size", "*.Size > big", "*.Size ~ 5", "a.b = 'c", "a.b == 5"])
+def test_what_is_no_condition_is_refused(bad):
+    with pytest.raises(TaskError):
+        Rule(properties=[bad])
+
+
+def test_systems_are_found_by_words_of_their_names():
+    assert picks(systems=["heizung"]) == picks(systems=["heating"]) == ["valve"]
+    assert picks(systems=["heat"]) == []
+
+
+def test_use_picks_rooms_and_what_is_in_them_by_geometry_or_by_the_file():
+    assert picks(use=["living"]) == ["sofa", "living"]
+    assert picks(use=["wc"]) == picks(use=["sanitary"]) == ["valve", "wc"]
+    assert picks(use=["kitchen"]) == []
+    assert [m.element.global_id for m in match(Rule("IfcSpace", use=["WC"]), told())] == ["wc"]
+
+
+def test_a_match_says_everything_that_made_it():
+    rule = Rule("IfcValve", ["V 1"], label="valves", use=["WC"], systems=["heating"], properties=["*.Size > 20"])
+    [(_, why)] = match(rule, told())
+    assert why == (
+        "rule 'valves': family 'V-1' has the word 'V 1', room '102 WC' has the word 'WC', Pset_Valve.Size is 25.0, "
+        "system 'HEATING' has the word 'heating'"
+    )
+
+
+ASKING = """
+schema = 1
+[tasks.rounds]
+objective = "time"
+priority = 2
+due = "PT1H"
+abilities = ["camera"]
+destination = { distance = 0.8, side = "front", facing = false }
+[[tasks.rounds.targets]]
+filter = "IfcValve"
+destination = "standoff"
+service_time = 7
+priority = 5
+due = 60
+abilities = ["arm"]
+[[tasks.rounds.targets]]
+filter = "IfcSpace"
+destination = "space"
+[[tasks.rounds.doors]]
+state = "locked"
+[[tasks.rounds.doors]]
+words = ["sliding"]
+state = "automatic"
+opening_time = "PT3S"
+"""
+
+
+def test_rules_say_what_is_asked_at_their_targets_and_how_doors_are(tmp_path):
+    task = load_task(written(tmp_path, ASKING))
+    assert (task.objective, task.priority, task.due, task.abilities) == ("time", 2.0, 3600.0, ("camera",))
+    assert task.destination == Standoff(0.8, "front", facing=False)
+    valves, rooms = task.targets
+    assert valves == Rule(
+        "IfcValve", destination=Standoff(), service_time=7.0, priority=5.0, due=60.0, abilities=("arm",)
+    )
+    assert (rooms.destination, rooms.service_time, rooms.priority, rooms.due) == ("space", None, None, None)
+    assert [(door.filter, door.state, door.opening_time) for door in task.doors] == [
+        ("IfcDoor", "locked", 0.0),
+        ("IfcDoor", "automatic", 3.0),
+    ]
+
+
+WRONG = """schema = 1
+[tasks.a]
+objective = "tme"
+priority = -1
+destination = { distanc = 1, side = "left" }
+[[tasks.a.targets]]
+properties = ["*.Size ~ 5"]
+destination = 5
+[[tasks.a.doors]]
+state = "lockd"
+[[tasks.a.obstacles]]
+priority = 3
+"""
+
+
+def test_mistakes_in_what_is_asked_are_told_with_the_nearest_name(tmp_path):
+    with pytest.raises(TaskError) as caught:
+        load_task(written(tmp_path, WRONG))
+    lines = [line.split("my.toml:")[1] for line in caught.value.message.split("\n")]
+    assert lines[0] == ("3: tasks.a.objective = 'tme': should be 'distance', 'time' or 'energy'; did you mean 'time'?")
+    assert lines[1] == "4: tasks.a.priority = -1: should be greater than or equal to 0."
+    assert "unknown key 'distanc' in tasks.a.destination; did you mean 'distance'?" in "".join(lines[2:4])
+    assert "tasks.a.destination.side = 'left': should be 'front', 'back' or 'any'." in "".join(lines[2:4])
+    assert lines[4].startswith("7: tasks.a.targets[0].properties = ['*.Size ~ 5']: '*.Size ~ 5' is not a condition.")
+    assert lines[5].startswith("8: tasks.a.targets[0].destination = 5: should be 'center'")
+    assert lines[6].endswith("did you mean 'locked'?")
+    assert lines[7].startswith("12: unknown key 'priority' in tasks.a.obstacles[0];")
+
+
+def test_a_target_and_its_stop_carry_what_their_rule_asks():
+    building = told()
+    task = Task(
+        "look",
+        targets=[
+            Rule("IfcFurniture", ["sofa"], label="sofas", priority=3, due=60, service_time=5, abilities=["arm"]),
+            Rule("IfcFurniture"),
+        ],
+        destination="standoff",
+        abilities=["camera"],
+    )
+    sofa, table = make_environment(building, task).targets
+    assert (sofa.label, sofa.priority, sofa.due, sofa.service_time, sofa.abilities) == ("sofas", 3, 60, 5, ("arm",))
+    assert (table.priority, table.due, table.service_time, table.abilities) == (1, None, None, ("camera",))
+    assert sofa.approach == table.approach == Standoff()

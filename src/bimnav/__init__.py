@@ -13,10 +13,12 @@ if TYPE_CHECKING:
     from bimnav._start import Start as Start, find_start as find_start
     from bimnav.building import (
         Building as Building,
+        Classification as Classification,
         Connector as Connector,
         Detection as Detection,
         Door as Door,
         Element as Element,
+        Facts as Facts,
         Issue as Issue,
         Ledger as Ledger,
         Mesh as Mesh,
@@ -67,13 +69,21 @@ if TYPE_CHECKING:
     from bimnav.samples import list_samples as list_samples, sample as sample
     from bimnav.sim import SimResult as SimResult, simulate as simulate
     from bimnav.stops import Stand as Stand, Stop as Stop, Unreached as Unreached
-    from bimnav.tasks import Rule as Rule, Task as Task, list_tasks as list_tasks, load_task as load_task
+    from bimnav.tasks import (
+        Rule as Rule,
+        Standoff as Standoff,
+        Task as Task,
+        list_tasks as list_tasks,
+        load_task as load_task,
+    )
     from bimnav.verify import Check as Check, check_path as check_path, check_plan as check_plan
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "bimnav.building": ("Building Connector Detection Door Element Issue Ledger Mesh Opening Shape Space Storey"),
+    "bimnav.building": (
+        "Building Classification Connector Detection Door Element Facts Issue Ledger Mesh Opening Shape Space Storey"
+    ),
     "bimnav.detections": "read_targets",
     "bimnav.environment": "IndoorEnvironment Obstacle Region Target Zone make_environment",
     "bimnav.errors": "BimnavError",
@@ -92,7 +102,7 @@ _HOMES = {
     "bimnav.robot": "Robot",
     "bimnav.samples": "list_samples sample",
     "bimnav.sim": "SimResult simulate",
-    "bimnav.tasks": "Rule Task list_tasks load_task",
+    "bimnav.tasks": "Rule Standoff Task list_tasks load_task",
     "bimnav.verify": "Check check_path check_plan",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bimnav._gates import DoorCheck
+from bimnav._placeholders import is_placeholder
 from bimnav._reach import Reach
 from bimnav.building import Building, Issue
 from bimnav.environment import IndoorEnvironment
@@ -24,11 +25,6 @@ _FURNITURE = re.compile(
     r"|stools?|lockers?|dressers?|refrigerators?|fridges?|stuhl|st[uü]hle|tische?|\w*schrank|\w*schr[aä]nke|sessel"
     r"|betten|bett|regale?|sillas?|mesas?|camas?|armarios?|sedi[ae]|tavol[io]|letti|letto|armadi[o]?|chaises?|lits?"
     r"|armoires?|stoel(en)?|tafels?|kast(en)?|стол|стул|кровать|шкаф|диван)\b",
-    re.IGNORECASE,
-)
-_PLACEHOLDER = re.compile(
-    r"n/?a|none|null|undefined|not ?defined|unknown|varies|default|tb[dc]|todo|x{2,}|\?+|_[A-Z -]+_|dd/mm/yyyy"
-    r"|1900-12-31(t[\d:]+)?|unbekannt|undefiniert",
     re.IGNORECASE,
 )
 _ROOMS_AT = {"inside": 2, "outside": 1, "nowhere": 0}
@@ -128,5 +124,5 @@ def _placeholders(building: Building) -> Iterable[Issue]:
 def _empty(sets: Mapping[str, Mapping[str, Any]]) -> Iterable[str]:
     for properties in sets.values():
         for name, value in properties.items():
-            if isinstance(value, str) and (value.strip() == name or _PLACEHOLDER.fullmatch(value.strip())):
+            if is_placeholder(name, value):
                 yield name

@@ -25,10 +25,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Building",
+    "Classification",
     "Connector",
     "Detection",
     "Door",
     "Element",
+    "Facts",
     "Issue",
     "Ledger",
     "Mesh",
@@ -397,6 +399,47 @@ class Detection:
         return _compressed(hashlib.sha256(text.encode()).digest()[:16])
 
 
+@dataclass(frozen=True, slots=True)
+class Classification:
+    """What a product is in a classification system.
+
+    Parameters
+    ----------
+    system
+        As the file names it, such as `Uniformat`; empty where it does not.
+    code
+        As the file writes it, such as `23-40 20 14 17 24: Coffee Tables`.
+    title
+        In words; empty where there are none.
+    """
+
+    system: str
+    code: str
+    title: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a model says of a product beside its names and its geometry.
+
+    Parameters
+    ----------
+    properties
+        Property sets of the product itself, `{set: {property: value}}`, as the file writes them.
+    type_properties
+        Property sets of its type.
+    classifications
+        References of the product, then those of its type.
+    systems
+        Names of the systems it belongs to: name, long name, object type and predefined type of each.
+    """
+
+    properties: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    type_properties: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    classifications: tuple[Classification, ...] = ()
+    systems: tuple[str, ...] = ()
+
+
 _GLOBAL_ID_DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
 
 
@@ -438,6 +481,8 @@ class Building:
         Answers `properties`: a GlobalId to property sets.
     property_readers
         The same for each file of several, by its path.
+    facts_reader
+        Answers `facts`: a GlobalId to what the model says of the product.
     georeference
         Where on Earth the model lies, if it says so.
     anchors
@@ -462,6 +507,7 @@ class Building:
     property_readers: Mapping[str, Callable[[str], Mapping[str, Mapping[str, Any]]]] = field(default_factory=dict)
     georeference: Georeference | None = None
     anchors: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    facts_reader: Callable[[str], Facts] | None = None
 
     def __post_init__(self) -> None:
         if not self.storeys:
@@ -518,6 +564,12 @@ class Building:
     def properties(self, global_id: str) -> Mapping[str, Mapping[str, Any]]:
         """Return the property sets of a product, `{set: {property: value}}`, as the file writes them."""
         return {} if self.property_reader is None else self.property_reader(global_id)
+
+    def facts(self, global_id: str) -> Facts:
+        """Return what the model says of a product: its own properties and its type's, classifications, systems."""
+        if self.facts_reader is not None:
+            return self.facts_reader(global_id)
+        return Facts(self.properties(global_id))
 
     def properties_by_source(self, global_id: str) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
         """Return the property sets of a product file by file, `{path: {set: {property: value}}}`."""

@@ -22,7 +22,7 @@ Place: TypeAlias = Sequence[Any]
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from bimnav.tasks import Rule, Task
+    from bimnav.tasks import Destination, Rule, Task
 
 __all__ = ["IndoorEnvironment", "Obstacle", "Place", "Region", "Target", "Zone", "make_environment"]
 
@@ -96,6 +96,18 @@ class Target:
         `model`, or `user` for a detection.
     rule
         Why it is a target.
+    label
+        What the rule is about.
+    service_time
+        Seconds the robot works there; None for the task's.
+    priority
+        How much it matters.
+    due
+        Seconds from the beginning of the job within which it should be served; None for no limit.
+    abilities
+        What a robot must be able to do there.
+    approach
+        Where the robot is to go for it.
     """
 
     global_id: str
@@ -105,6 +117,12 @@ class Target:
     footprint: BaseGeometry | None
     source: Literal["model", "user"]
     rule: str
+    label: str = ""
+    service_time: float | None = None
+    priority: float = 1.0
+    due: float | None = None
+    abilities: tuple[str, ...] = ()
+    approach: Destination = "center"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -306,10 +324,13 @@ def make_environment(
     )
     walkable = sorted({region.storey for region in regions})
 
-    visited = {p.global_id: (p, why) for rule in task.targets for p, why in match(rule, building)}
+    visited: dict[str, tuple[Element | Space, str, Rule]] = {}
+    for rule in task.targets:
+        for product, why in match(rule, building):
+            visited.setdefault(product.global_id, (product, why, rule))
     left_out = {p.global_id: f"ignored: {why}" for rule in task.ignore for p, why in match(rule, building)}
     if task.removes_targets:
-        left_out |= {g: f"target, taken away: {why}" for g, (_, why) in visited.items()}
+        left_out |= {g: f"target, taken away: {why}" for g, (_, why, _rule) in visited.items()}
     chosen = {p.global_id: why for rule in task.obstacles for p, why in match(rule, building)}
     candidates: list[tuple[Element, str]] = []
     for element in building.elements:
@@ -341,10 +362,10 @@ def make_environment(
         outside_bands=tuple(e.global_id for e, _ in candidates if e.global_id not in blocking),
         issues=issues,
     )
-    targets = [_found(product, why, environment) for product, why in visited.values()]
+    targets = [_found(product, why, rule, environment) for product, why, rule in visited.values()]
     home = None if start is None else environment.storeys_at(start)[0]
     targets += [_placed(detection, environment, home) for detection in building.detections]
-    lost = tuple(p.global_id for (p, _), t in zip(visited.values(), targets, strict=False) if t is None)
+    lost = tuple(p.global_id for (p, *_), t in zip(visited.values(), targets, strict=False) if t is None)
     if lost:
         message = f"{len(lost)} targets of task {task.name!r} have no geometry, so no place to go to."
         issues += (Issue("target-without-shape", message, lost, "error", "Ask for an export with bodies."),)
@@ -387,7 +408,7 @@ def _zones(product: Element | Space, levels: Sequence[float], factor: float, why
             yield Zone(product.global_id, product.name, storey, polygon, factor, why)
 
 
-def _found(product: Element | Space, why: str, environment: IndoorEnvironment) -> Target | None:
+def _found(product: Element | Space, why: str, rule: Rule, environment: IndoorEnvironment) -> Target | None:
     """Make a target of an element: its destination is the middle of its plan view."""
     bounds = product.bounds
     if bounds is None:
@@ -396,7 +417,22 @@ def _found(product: Element | Space, why: str, environment: IndoorEnvironment) -
     center = polygon.centroid if polygon.area > 0 else shapely.box(*bounds[0, :2], *bounds[1, :2]).centroid
     storey = _storey_below(environment, center, float(bounds[0, 2]))
     destination = (center.x, center.y, environment.levels[storey])
-    return Target(product.global_id, product.name, storey, destination, polygon, "model", why)
+    task = environment.task
+    return Target(
+        product.global_id,
+        product.name,
+        storey,
+        destination,
+        polygon,
+        "model",
+        why,
+        rule.label,
+        rule.service_time,
+        task.priority if rule.priority is None else rule.priority,
+        task.due if rule.due is None else rule.due,
+        rule.abilities or task.abilities,
+        rule.destination or task.destination,
+    )
 
 
 def _storey_below(environment: IndoorEnvironment, point: BaseGeometry, z: float) -> int:
@@ -429,4 +465,8 @@ def _placed(detection: Detection, environment: IndoorEnvironment, home: int | No
         footprint,
         "user",
         "placed by the user",
+        priority=environment.task.priority,
+        due=environment.task.due,
+        abilities=environment.task.abilities,
+        approach=environment.task.destination,
     )

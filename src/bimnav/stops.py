@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -75,6 +75,14 @@ class Stop:
     candidates
         Every place from which the target may be served, best first; the stop's own among them. A planner
         may choose any, by `at`.
+    service_time
+        Seconds the robot works there; None for the task's.
+    priority
+        How much it matters.
+    due
+        Seconds from the beginning of the job within which it should be served; None for no limit.
+    abilities
+        What a robot must be able to do there.
     """
 
     global_id: str
@@ -87,6 +95,10 @@ class Stop:
     source: Literal["model", "user"] = "model"
     heading: float | None = None
     candidates: tuple[Stand, ...] = ()
+    service_time: float | None = None
+    priority: float = 1.0
+    due: float | None = None
+    abilities: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         own = Stand(self.cell, self.end, self.distance, self.heading)
@@ -122,7 +134,7 @@ def stop_at(graph: NavGraph, target: Target, cell: Cell) -> Stop | None:
             target.destination,
             target.destination,
             "reach" if reach else "center",
-            source=target.source,
+            **_asked(target),
         )
     return _standing_stop(graph, target, cell)
 
@@ -130,7 +142,12 @@ def stop_at(graph: NavGraph, target: Target, cell: Cell) -> Stop | None:
 def _standing_stop(graph: NavGraph, target: Target, cell: Cell) -> Stop:
     end = graph.frame.center_of(cell)
     distance = math.dist(end, target.destination)
-    return Stop(target.global_id, target.name, cell, target.destination, end, "standing", distance, target.source)
+    return Stop(target.global_id, target.name, cell, target.destination, end, "standing", distance, **_asked(target))
+
+
+def _asked(target: Target) -> dict[str, Any]:
+    """Return what is asked of a robot at a target, for its stop."""
+    return {name: getattr(target, name) for name in ("source", "service_time", "priority", "due", "abilities")}
 
 
 def standing_at(graph: NavGraph, target: Target, component: int | None) -> Stop | None:

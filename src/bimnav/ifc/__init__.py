@@ -105,7 +105,13 @@ def _building_of(
     with _Display(path.name, progress) as report:
         model = _model_of(path, sha256, cache, limits, report)
     selector = selector_for(path, sha256, model)
-    return to_building(model, sources=(str(path),), selector=selector.select, property_reader=selector.properties)
+    return to_building(
+        model,
+        sources=(str(path),),
+        selector=selector.select,
+        property_reader=selector.properties,
+        facts_reader=selector.facts,
+    )
 
 
 def cache_info(folder: Path | None = None) -> CacheInfo:

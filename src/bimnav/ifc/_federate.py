@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bimnav._georeference import Georeference, turn_of
 from bimnav._select import select_by_hand
-from bimnav.building import Building, Door, Element, Issue, Ledger, Opening, Space, Storey
+from bimnav.building import Building, Door, Element, Facts, Issue, Ledger, Opening, Space, Storey
 from bimnav.errors import SelectorError, ValueRangeError
 from bimnav.ifc._findings import Findings
 from bimnav.ifc._frames import SAME, Frame, boxes_of, called, extent_of, find_frame, map_error, moved, placement_of
@@ -103,6 +103,7 @@ def federate(buildings: Sequence[Building], *, offsets: Sequence[ArrayLike | Non
         selector=answers.select,
         property_reader=answers.properties,
         property_readers=answers.readers,
+        facts_reader=answers.facts,
     )
 
 
@@ -420,22 +421,27 @@ class _Answers:
         What answers queries, for each model.
     readers
         What reads properties, by path.
+    tellers
+        What tells the facts of a product, for each model.
     """
 
     selectors: tuple[Callable[[str], Iterable[str]], ...]
     readers: Mapping[str, Reader]
+    tellers: tuple[Callable[[str], Facts], ...]
 
     @classmethod
     def of(cls, buildings: Iterable[Building]) -> _Answers:
         selectors: list[Callable[[str], Iterable[str]]] = []
         readers: dict[str, Reader] = {}
+        tellers: list[Callable[[str], Facts]] = []
         for building in buildings:
+            tellers.append(building.facts_reader or building.facts)
             selectors.append(building.selector or partial(select_by_hand, (*building.elements, *building.spaces)))
             if building.property_readers:
                 readers |= building.property_readers
             elif building.property_reader:
                 readers[building.sources[0] if building.sources else building.name] = building.property_reader
-        return cls(tuple(selectors), readers)
+        return cls(tuple(selectors), readers, tuple(tellers))
 
     def select(self, query: str) -> tuple[str, ...]:
         """Return what a query picks in any model; that some have no such class is no error."""
@@ -452,10 +458,24 @@ class _Answers:
             raise refusals[0]
         return tuple(found)
 
+    def facts(self, global_id: str) -> Facts:
+        """Return what all models say of a product; of a property in several the first holds."""
+        told = [tell(global_id) for tell in self.tellers]
+        return Facts(
+            _merged(facts.properties for facts in told),
+            _merged(facts.type_properties for facts in told),
+            tuple(dict.fromkeys(each for facts in told for each in facts.classifications)),
+            tuple(dict.fromkeys(name for facts in told for name in facts.systems)),
+        )
+
     def properties(self, global_id: str) -> dict[str, dict[str, Any]]:
         """Return all property sets of a product; of a property in several models the first holds."""
-        merged: dict[str, dict[str, Any]] = {}
-        for read in self.readers.values():
-            for name, values in read(global_id).items():
-                merged[name] = {**values, **merged.get(name, {})}
-        return merged
+        return _merged(read(global_id) for read in self.readers.values())
+
+
+def _merged(told: Iterable[Mapping[str, Mapping[str, Any]]]) -> dict[str, dict[str, Any]]:
+    merged: dict[str, dict[str, Any]] = {}
+    for sets in told:
+        for name, values in sets.items():
+            merged[name] = {**values, **merged.get(name, {})}
+    return merged

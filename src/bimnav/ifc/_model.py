@@ -20,6 +20,7 @@ from bimnav.building import (
     Connector,
     Door,
     Element,
+    Facts,
     Issue,
     Ledger,
     Mesh,
@@ -48,7 +49,8 @@ class Model:
         - `meshes`: `[{quality}]`, one per mesh of the arrays
         - `elements`: `[{global_id, ifc_class, name, type_name, object_type, predefined_type, tag,
           storey, space, parent, step_id, shapes: [index of a shape, ...]}]`
-        - `spaces`: `[{global_id, name, long_name, storey, step_id, shapes}]`
+        - `spaces`: `[{global_id, name, long_name, type_name, object_type, predefined_type, storey, step_id,
+          shapes}]`
         - `openings`: `[{global_id, host, fillings: [global_id], shapes}]`
         - `doors`: `[{global_id, opening, width, height}]`
         - `connectors`: `[{global_id, name, kind, parts, low, high}]`
@@ -72,6 +74,7 @@ def to_building(
     sources: Sequence[str] = (),
     selector: Callable[[str], Iterable[str]] | None = None,
     property_reader: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None,
+    facts_reader: Callable[[str], Facts] | None = None,
 ) -> Building:
     """Turn tables and arrays into the values the rest of the library works on.
 
@@ -79,7 +82,7 @@ def to_building(
     ----------
     sources
         Paths of the files the model was read from.
-    selector, property_reader
+    selector, property_reader, facts_reader
         As in `Building`.
     """
     tables = model.tables
@@ -120,6 +123,7 @@ def to_building(
         sources=tuple(sources),
         selector=selector,
         property_reader=property_reader,
+        facts_reader=facts_reader,
     )
 
 

@@ -21,7 +21,7 @@ from ifcopenshell.util.selector import FacetTransformer, filter_elements_grammar
 from bimnav.errors import SelectorError
 from bimnav.ifc._prescan import SCHEMAS
 
-__all__ = ["evaluate", "properties_of"]
+__all__ = ["evaluate", "plain", "properties_of"]
 
 _LOG = logging.getLogger(__name__)
 _RENAMED = {  # a class to what holds its elements where the schema lacks it
@@ -67,7 +67,7 @@ def evaluate(file: Any, ids: Mapping[int, str], query: str) -> tuple[str, ...]:
 
 def properties_of(entity: Any) -> dict[str, dict[str, Any]]:
     """Return the property sets of a product, those of its type included, as plain values."""
-    sets: dict[str, dict[str, Any]] = _plain(get_psets(entity))
+    sets: dict[str, dict[str, Any]] = plain(get_psets(entity))
     return sets
 
 
@@ -182,10 +182,10 @@ def _refuse(query: str, what: str, hint: str, column: int | None = None, **conte
     raise SelectorError(f"filter {query!r} {what}{where}.", hint, {"query": query, "column": column, **context})
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return properties as plain values, without the step ids that the kernel adds to every set."""
     if isinstance(value, Mapping):
-        return {key: _plain(inner) for key, inner in value.items() if key != "id"}
+        return {key: plain(inner) for key, inner in value.items() if key != "id"}
     if isinstance(value, (list, tuple)):
-        return [_plain(inner) for inner in value]
+        return [plain(inner) for inner in value]
     return value if isinstance(value, (str, int, float, bool, type(None))) else str(value)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bimnav.building import Facts
 from bimnav.errors import FileMissingError, InputError
 from bimnav.ifc._model import Model
 from bimnav.ifc._reading import open_copy
@@ -37,8 +38,11 @@ class Selector:
 
     def __init__(self, path: Path, sha256: str, ids: Mapping[int, str]) -> None:
         self._path, self._sha256, self._ids = path, sha256, dict(ids)
+        self._step_ids = {global_id: step_id for step_id, global_id in self._ids.items()}
         self._answers: dict[str, tuple[str, ...]] = {}
+        self._known: dict[str, Facts] = {}
         self._opened: Any = None
+        self._read_facts: Any = None
 
     def __reduce__(self) -> tuple[type[Selector], tuple[Path, str, dict[int, str]]]:
         return type(self), (self._path, self._sha256, self._ids)
@@ -63,10 +67,25 @@ class Selector:
         """Return the property sets of a product, those of its type included, as the file writes them."""
         from bimnav.ifc._query import properties_of
 
-        for step_id, known in self._ids.items():
-            if known == global_id:
-                return properties_of(self._file.by_id(step_id))
-        return {}
+        if global_id not in self._step_ids:
+            return {}
+        return properties_of(self._file.by_id(self._step_ids[global_id]))
+
+    def facts(self, global_id: str) -> Facts:
+        """Return what the file says of a product; each product is read once."""
+        if global_id not in self._known:
+            self._known[global_id] = self._facts_of(global_id)
+        return self._known[global_id]
+
+    def _facts_of(self, global_id: str) -> Facts:
+        from bimnav.ifc._facts import FactsReader
+
+        if global_id not in self._step_ids:
+            return Facts()
+        if self._read_facts is None:
+            self._read_facts = FactsReader()
+        facts: Facts = self._read_facts(self._file.by_id(self._step_ids[global_id]))
+        return facts
 
     @property
     def _file(self) -> Any:

@@ -135,10 +135,14 @@ class Rows:
 
     def space(self, space: Entity) -> Row:
         """Describe a room."""
+        kind = self._relations.kind.get(space.id())
         return {
             "global_id": self._ids[space.id()],
             "name": text_of(space.Name),
             "long_name": text_of(space.LongName),
+            "type_name": text_of(kind.Name) if kind else "",
+            "object_type": text_of(space.ObjectType),
+            "predefined_type": _predefined_type(space, kind),
             "storey": self._nearest(space.id(), self._storeys),
             "step_id": space.id(),
             "shapes": self._shapes(space.id()),

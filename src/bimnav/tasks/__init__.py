@@ -2,6 +2,17 @@
 
 from bimnav.tasks._files import TaskInfo, list_tasks, load_task, task_schema
 from bimnav.tasks._match import Match, match
-from bimnav.tasks._task import Destination, Rule, Task
+from bimnav.tasks._task import Destination, Rule, Standoff, Task
 
-__all__ = ["Destination", "Match", "Rule", "Task", "TaskInfo", "list_tasks", "load_task", "match", "task_schema"]
+__all__ = [
+    "Destination",
+    "Match",
+    "Rule",
+    "Standoff",
+    "Task",
+    "TaskInfo",
+    "list_tasks",
+    "load_task",
+    "match",
+    "task_schema",
+]

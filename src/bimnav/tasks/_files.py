@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bimnav.errors import FileKindError, FileMissingError, FileTooLargeError, InputError, TaskError
-from bimnav.tasks._task import RULE_LISTS, Rule, Task
+from bimnav.tasks._task import RULE_LISTS, Rule, Standoff, Task
 from bimnav.tasks._toml import Problem, Toml, read_toml
 
 if TYPE_CHECKING:
@@ -148,12 +148,20 @@ def _task(name: str, table: TaskTable, source: str, toml: Toml) -> Task:
     def rules(kind: str) -> tuple[Rule, ...]:
         tables: list[RuleTable] = getattr(table, kind)
         return tuple(
-            Rule(**rule.model_dump(), source=f"{source}:{toml.line_of(('tasks', name, kind, k))}")
+            Rule(**_values(rule, ()), source=f"{source}:{toml.line_of(('tasks', name, kind, k))}")
             for k, rule in enumerate(tables)
         )
 
-    values = table.model_dump(exclude=set(RULE_LISTS)) | {kind: rules(kind) for kind in RULE_LISTS}
+    values = _values(table, (*RULE_LISTS, "extends")) | {kind: rules(kind) for kind in RULE_LISTS}
     return Task(name, **values, source=f"{source}:{toml.line_of(('tasks', name))}")
+
+
+def _values(table: TaskTable | RuleTable, but: Iterable[str]) -> dict[str, Any]:
+    """Return what a table says, for the value it becomes."""
+    values = table.model_dump(exclude=set(but))
+    if isinstance(values.get("destination"), dict):
+        values["destination"] = Standoff(**values["destination"])
+    return values
 
 
 def _mistakes(source: str, problems: Iterable[Problem]) -> TaskError:

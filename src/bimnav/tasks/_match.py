@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from bimnav.building import Building, Element, Space
+from bimnav._classification import classifications_of, is_below
+from bimnav.building import Building, Element, Facts, Space
 from bimnav.errors import ModelError, SelectorError, TaskError
+from bimnav.tasks._conditions import parse_condition
 from bimnav.tasks._task import Rule
 from bimnav.tasks._words import folded, haystack, needle
 
-__all__ = ["Match", "match"]
+__all__ = ["Match", "find", "match"]
 
 Product: TypeAlias = Element | Space
+Test: TypeAlias = Callable[[Product], "str | None"]  # None: fails; else why it holds, or nothing to say
 
 _SLACK = 0.35  # metres; finish floors and sunken placements lie this far from their storey's height
 
@@ -40,21 +43,37 @@ def match(rule: Rule, building: Building) -> tuple[Match, ...]:
     TaskError
         If a storey or space of the rule does not exist, or fewer or more are found than it expects.
     """
-    words = [(word, needle(word)) for word in rule.words]
-    excluded = [needle(word) for word in rule.exclude_words]
-    is_placed = _placed(rule, building)
-    found = []
-    for product in _filtered(rule, building):
-        why = _why(product, rule, words, excluded)
-        if why and is_placed(product):
-            found.append(Match(product, why))
+    found = find(rule, building)
     if not rule.is_met(len(found)):
         raise TaskError(
             f"{_told(rule)} finds {len(found)} in {building.name!r} and expects {rule.expect}.",
             f"Its filter {rule.filter!r} alone picks {len(_filtered(rule, building))}.",
             {"rule": rule.label, "source": rule.source, "found": len(found), "expect": rule.expect},
         )
+    return found
+
+
+def find(rule: Rule, building: Building) -> tuple[Match, ...]:
+    """Return what a rule picks, however many it expects."""
+    tests = [make(rule, building) for make in _TESTS]
+    found = []
+    for product in _filtered(rule, building):
+        reasons = _reasons(product, tests)
+        if reasons is not None:
+            why = ", ".join(filter(None, reasons)) or f"{product.ifc_class} passes the filter {rule.filter!r}"
+            found.append(Match(product, f"{_told(rule)}: {why}"))
     return tuple(found)
+
+
+def _reasons(product: Product, tests: Iterable[Test]) -> list[str] | None:
+    """Return what each test has to say for a product, or None if one fails."""
+    reasons = []
+    for test in tests:
+        reason = test(product)
+        if reason is None:
+            return None
+        reasons.append(reason)
+    return reasons
 
 
 def _filtered(rule: Rule, building: Building) -> tuple[Product, ...]:
@@ -79,35 +98,98 @@ def _names(product: Product) -> Iterator[tuple[str, str]]:
     yield "name", product.name
 
 
-def _why(product: Product, rule: Rule, words: list[tuple[str, str]], excluded: list[str]) -> str:
-    """Say why a product that passed the filter is picked; empty if it is not."""
-    names = [(field, name, haystack(name)) for field, name in _names(product) if name]
-    hits = (
-        f"{field} {name!r} has the word {word!r}"
-        for field, name, text in names
-        for word, sought in words
-        if sought in text
-    )
-    hit = next(hits, "") if words else f"{product.ifc_class} passes the filter {rule.filter!r}"
-    if not hit or any(sought in text for _, _, text in names for sought in excluded):
-        return ""
-    return f"{_told(rule)}: {hit}"
+def _by_name(rule: Rule, _: Building) -> Test:
+    """Test for words in the names of a product, and for excluded ones."""
+    words = [(word, needle(word)) for word in rule.words]
+    excluded = [needle(word) for word in rule.exclude_words]
+
+    def test(product: Product) -> str | None:
+        names = [(field, name, haystack(name)) for field, name in _names(product) if name]
+        if any(sought in text for _field, _name, text in names for sought in excluded):
+            return None
+        if not words:
+            return ""
+        hits = (f"{field} {name!r} {_hit(text, words)}" for field, name, text in names if _hit(text, words))
+        return next(hits, None)
+
+    return test
 
 
-def _placed(rule: Rule, building: Building) -> Callable[[Product], bool]:
-    """Return the test whether a product stands where the rule wants it."""
+def _hit(text: str, words: list[tuple[str, str]]) -> str:
+    return next((f"has the word {word!r}" for word, sought in words if sought in text), "")
+
+
+def _by_place(rule: Rule, building: Building) -> Test:
+    """Test whether a product stands where the rule wants it."""
     storeys = {_storey(name, rule, building) for name in rule.storeys}
     spaces = [space for name in rule.spaces for space in _spaces(name, rule, building)]
-    inside = {space.global_id for space in spaces}
 
-    def is_placed(product: Product) -> bool:
+    def test(product: Product) -> str | None:
         if storeys and _standing_on(product, building) not in storeys:
-            return False
-        if not spaces or product.global_id in inside or (isinstance(product, Element) and product.space in inside):
-            return True
-        return any(_holds(space, product) for space in spaces)
+            return None
+        if spaces and _room_of(product, spaces) is None:
+            return None
+        return ""
 
-    return is_placed
+    return test
+
+
+def _by_use(rule: Rule, building: Building) -> Test:
+    """Test whether a product is, or lies in, a room with one of the words in its names."""
+    words = [(word, needle(word)) for word in rule.use]
+    hits = {space.global_id: _use_of(space, words) for space in building.spaces} if words else {}
+    spaces = [space for space in building.spaces if hits.get(space.global_id)]
+
+    def test(product: Product) -> str | None:
+        if not words:
+            return ""
+        room = _room_of(product, spaces)
+        return None if room is None else f"room {room.label!r} {hits[room.global_id]}"
+
+    return test
+
+
+def _use_of(space: Space, words: list[tuple[str, str]]) -> str:
+    return next((hit for _, name in _names(space) if name and (hit := _hit(haystack(name), words))), "")
+
+
+def _by_facts(rule: Rule, building: Building) -> Test:
+    """Test classification, properties and systems; what the rule does not ask for is not read."""
+    conditions = [parse_condition(text) for text in rule.properties]
+    systems = [(word, needle(word)) for word in rule.systems]
+    asks = bool(conditions or systems or rule.classification)
+
+    def test(product: Product) -> str | None:
+        if not asks:
+            return ""
+        facts = building.facts(product.global_id)
+        reasons = [condition.met_by(facts) for condition in conditions]
+        if rule.classification:
+            reasons.append(_classified(facts, rule.classification))
+        if systems:
+            reasons.append(next((f"system {n!r} {h}" for n in facts.systems if (h := _hit(haystack(n), systems))), ""))
+        return ", ".join(reasons) if all(reasons) else None
+
+    return test
+
+
+def _classified(facts: Facts, wanted: Iterable[str]) -> str:
+    for classification, place in classifications_of(facts):
+        for sought in wanted:
+            if is_below(classification, sought):
+                told = " ".join(filter(None, (classification.system, classification.code, classification.title)))
+                return f"{place} {told!r} is in {sought!r}"
+    return ""
+
+
+_TESTS = (_by_name, _by_place, _by_use, _by_facts)  # cheapest first
+
+
+def _room_of(product: Product, spaces: Sequence[Space]) -> Space | None:
+    """Return the first of some rooms that a product is, or that the file or the geometry puts it in."""
+    placed = product.global_id if isinstance(product, Space) else product.space
+    stated = next((space for space in spaces if space.global_id in (product.global_id, placed)), None)
+    return stated or next((space for space in spaces if _holds(space, product)), None)
 
 
 def _storey(name: str, rule: Rule, building: Building) -> str:

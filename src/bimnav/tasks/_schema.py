@@ -7,15 +7,33 @@ import re
 import reprlib
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+)
 
-from bimnav.tasks._task import EXPECT, RULE_LISTS, Destination, checked_words
+from bimnav.tasks._task import (
+    EXPECT,
+    RULE_LISTS,
+    DoorState,
+    Objective,
+    Place,
+    Side,
+    checked_conditions,
+    checked_words,
+)
 from bimnav.tasks._toml import Key, Problem, Toml
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-__all__ = ["AvoidTable", "RuleTable", "TaskFile", "TaskTable", "check_tables"]
+__all__ = ["RuleTable", "StandoffTable", "TaskFile", "TaskTable", "check_tables"]
 
 _DURATION = re.compile(r"P(?=.)(?:(N)D)?(?:T(?=.)(?:(N)H)?(?:(N)M)?(?:(N)S)?)?".replace("N", r"\d+(?:[.,]\d+)?"))
 
@@ -51,6 +69,11 @@ def _words(values: list[str]) -> list[str]:
     return values
 
 
+def _conditions(values: list[str]) -> list[str]:
+    checked_conditions(values)
+    return values
+
+
 Words = Annotated[list[Annotated[str, Field(min_length=1)]], AfterValidator(_words)]
 Seconds = Annotated[
     float,
@@ -66,6 +89,22 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
+class StandoffTable(_Table):
+    """Standing at a distance from a target."""
+
+    distance: float = Field(0.5, ge=0, allow_inf_nan=False, description="From robot to outline, metres.")
+    side: Side = Field("any", description="Which side of the target, as the model turns it.")
+    facing: bool = Field(True, description="Whether the robot turns to the target.")
+
+
+_TAGS = ("word", "table")  # pydantic names the branch of a union in its errors
+DestinationOf = Annotated[
+    Annotated[Place, Tag("word")] | Annotated[StandoffTable, Tag("table")],
+    Discriminator(lambda value: _TAGS[isinstance(value, (dict, StandoffTable))]),
+]
+Priority = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
 class RuleTable(_Table):
     """Picks elements, or rooms: what the filter picks, if a word stands in its names."""
 
@@ -75,9 +114,33 @@ class RuleTable(_Table):
     label: str = Field("", description="What the rule is about, for explanations.")
     storeys: Words = Field([], description="Names or GlobalIds of the storeys it looks on.")
     spaces: Words = Field([], description="Names or GlobalIds of the rooms it looks in.")
+    use: Words = Field([], description="Words in the name of the room, or of the room that the element is in.")
+    classification: Words = Field([], description="Beginnings of codes, such as 'OmniClass: 23.40', or titles.")
+    properties: Annotated[list[Annotated[str, Field(min_length=1)]], AfterValidator(_conditions)] = Field(
+        [], description="Conditions that all hold, such as \"Pset_DoorCommon.FireRating != ''\"."
+    )
+    systems: Words = Field([], description="Words in the names of the systems it is part of.")
     expect: Annotated[str, AfterValidator(_expected)] = Field(
         "", json_schema_extra={"pattern": f"{EXPECT}|^$"}, description="How many it must find, such as '>=1'."
     )
+
+
+class TargetTable(RuleTable):
+    """A rule for what the robot visits."""
+
+    destination: DestinationOf | None = Field(None, description="Where the robot goes for it.")
+    service_time: Seconds | None = Field(None, description="Time there: seconds, or ISO 8601 such as 'PT30S'.")
+    priority: Priority | None = Field(None, description="How much it matters, 0 or more.")
+    due: Seconds | None = Field(None, description="Time from the beginning within which it should be served.")
+    abilities: Words = Field([], description="What a robot must be able to do there.")
+
+
+class DoorTable(RuleTable):
+    """A rule for how doors are."""
+
+    filter: str = Field("IfcDoor", pattern=r"\S", description="Query in the selector language of IfcOpenShell.")
+    state: DoorState = Field("closed", description="How the doors are: 'locked', 'automatic', 'closed' or 'open'.")
+    opening_time: Seconds = Field(0.0, description="Time until such a door is open.")
 
 
 class AvoidTable(RuleTable):
@@ -90,15 +153,21 @@ class TaskTable(_Table):
     """A job, in words that hold in any building."""
 
     description: str = Field("", description="What the job is, in a line.")
-    targets: list[RuleTable] = Field([], description="What the robot visits.")
+    extends: str = Field("", description="Name of the task that this one builds on: its rules come first.")
+    targets: list[TargetTable] = Field([], description="What the robot visits.")
     obstacles: list[RuleTable] = Field([], description="What blocks; without any, everything solid in its way.")
     ignore: list[RuleTable] = Field([], description="What does not block even so.")
     avoid: list[AvoidTable] = Field([], description="Floor that costs more to cross.")
     restricted: list[RuleTable] = Field([], description="Floor never to enter.")
     exits: list[RuleTable] = Field([], description="Ways out of the building.")
     docks: list[RuleTable] = Field([], description="Where the robot waits and charges.")
+    doors: list[DoorTable] = Field([], description="How doors are; the first rule that picks one holds.")
     service_time: Seconds = Field(0.0, description="Time at each target: seconds, or ISO 8601 such as 'PT30S'.")
-    destination: Destination = Field("center", description="Drive onto a target's middle, or stand next to it.")
+    destination: DestinationOf = Field("center", description="Drive onto a target, or where to stand for it.")
+    priority: Priority = Field(1.0, description="How much each target matters, 0 or more.")
+    due: Seconds | None = Field(None, description="Time from the beginning within which to serve each target.")
+    abilities: Words = Field([], description="What a robot must be able to do at each target.")
+    objective: Objective = Field("distance", description="What to keep small: 'distance', 'time' or 'energy'.")
     removes_targets: bool = Field(False, description="Whether targets do not block and are gone once served.")
 
 
@@ -119,13 +188,20 @@ def check_tables(toml: Toml) -> tuple[dict[str, TaskTable], list[Problem]]:
         return TaskFile.model_validate(toml.document).tasks, []
     except ValidationError as error:
         return {}, [
-            Problem(toml.line_of(d["loc"]), _explained(d), _dotted(d["loc"]), _short.repr(d["input"]))
+            Problem(toml.line_of(key), _explained(d, key), _dotted(key), _short.repr(d["input"]))
             for d in error.errors(include_url=False)
+            for key in [_key_of(d)]
         ]
 
 
-def _explained(detail: ErrorDetails) -> str:
-    key, kind = detail["loc"], detail["type"]
+def _key_of(detail: ErrorDetails) -> Key:
+    """Return where an error stands, without the branches of unions."""
+    key = detail["loc"]
+    return tuple(part for k, part in enumerate(key) if k == 0 or key[k - 1] != "destination" or part not in _TAGS)
+
+
+def _explained(detail: ErrorDetails, key: Key) -> str:
+    kind = detail["type"]
     last, table = str(key[-1]), _dotted(key[:-1]) or "the file"
     if kind == "missing":
         return f"{last!r} is missing in {table}{'; begin with schema = 1.' if last == 'schema' else '.'}"
@@ -144,14 +220,20 @@ def _explained(detail: ErrorDetails) -> str:
         "string_type": "should be a text in quotes",
         "value_error": str(detail.get("ctx", {}).get("error")),
     }.get(kind) or detail["msg"].removeprefix("Input ")
-    return f"{_dotted(key)} = {_short.repr(detail['input'])}: {wanted.rstrip('.')}."
+    if kind == "literal_error":
+        near = difflib.get_close_matches(str(detail["input"]), re.findall(r"'(\w+)'", wanted), 1)
+        wanted += f"; did you mean {near[0]!r}?" if near else ""
+    return f"{_dotted(key)} = {_short.repr(detail['input'])}: {wanted.rstrip('.')}{'' if wanted[-1] == '?' else '.'}"
 
 
 def _layout(key: Key) -> type[BaseModel]:
     """Return the table that a key stands in."""
+    if key[-2:-1] == ("destination",):
+        return StandoffTable
     if len(key) < 5:
         return TaskFile if len(key) == 1 else TaskTable
-    return AvoidTable if key[2] == "avoid" else RuleTable
+    tables: dict[object, type[RuleTable]] = {"avoid": AvoidTable, "doors": DoorTable, "targets": TargetTable}
+    return tables.get(key[2], RuleTable)
 
 
 def _dotted(key: Key) -> str:

@@ -9,13 +9,29 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias, get_args
 
 from bimnav.errors import TaskError
+from bimnav.tasks._conditions import parse_condition
 from bimnav.tasks._words import tokens
 
-__all__ = ["EXPECT", "RULE_LISTS", "Destination", "Rule", "Task", "checked_words"]
+__all__ = [
+    "EXPECT",
+    "RULE_LISTS",
+    "Destination",
+    "DoorState",
+    "Objective",
+    "Place",
+    "Rule",
+    "Side",
+    "Standoff",
+    "Task",
+    "checked_words",
+]
 
-Destination: TypeAlias = Literal["center", "nearest_free"]
+Place: TypeAlias = Literal["center", "nearest_free", "standoff", "space"]
+Side: TypeAlias = Literal["front", "back", "any"]
+DoorState: TypeAlias = Literal["locked", "automatic", "closed", "open"]
+Objective: TypeAlias = Literal["distance", "time", "energy"]
 
-RULE_LISTS = ("targets", "obstacles", "ignore", "avoid", "restricted", "exits", "docks")
+RULE_LISTS = ("targets", "obstacles", "ignore", "avoid", "restricted", "exits", "docks", "doors")
 EXPECT = r"^\s*(>=|<=|==|>|<|=)?\s*(\d{1,9})\s*$"
 
 
@@ -30,31 +46,99 @@ def checked_words(words: Iterable[str]) -> tuple[str, ...]:
     return words
 
 
+def checked_conditions(conditions: Iterable[str]) -> tuple[str, ...]:
+    """Return conditions on properties as a tuple; each must be one."""
+    if isinstance(conditions, str):
+        raise TaskError(f"{conditions!r} is one text.", f"Give a list: [{conditions!r}].")
+    conditions = tuple(conditions)
+    for condition in conditions:
+        parse_condition(condition)
+    return conditions
+
+
+@dataclass(frozen=True, slots=True)
+class Standoff:
+    """Standing at a distance from a target.
+
+    Parameters
+    ----------
+    distance
+        From the robot's middle to the target's outline, metres.
+    side
+        Which side of the target, as the model turns it: `front` is its own negative y, `back` its
+        positive y.
+    facing
+        Whether the robot turns to the target.
+
+    Raises
+    ------
+    TaskError
+        If a value cannot be used.
+    """
+
+    distance: float = 0.5
+    side: Side = "any"
+    facing: bool = True
+
+    def __post_init__(self) -> None:
+        _check_number("standoff: distance", self.distance, 0, "metres")
+        _check_known("standoff: side", self.side, get_args(Side))
+
+
+Destination: TypeAlias = Place | Standoff
+
+
 @dataclass(frozen=True, slots=True)
 class Rule:
     """Picks elements of a building, or rooms.
 
-    What the filter picks is kept if one of the words stands in its family name, type name, ObjectType or
-    name, and none of the excluded words does. Words are found whole, in any case, with or without accents:
-    `Müll` is found in `MULL:2` and not in `Mullion`. A word may be several: `banana peel`. Words in scripts
-    that do not part them with spaces are found anywhere.
+    What the filter picks is kept if all that the rule says besides holds, too. Words are found whole, in
+    any case, with or without accents: `Müll` is found in `MULL:2` and not in `Mullion`. A word may be
+    several: `banana peel`. Words in scripts that do not part them with spaces are found anywhere.
 
     Parameters
     ----------
     filter
         In the selector language of IfcOpenShell, such as `IfcFurniture, Name=/.*Table.*/`.
     words
-        At least one of them must be found; none given, the filter decides alone.
+        At least one of them stands in the family name, type name, ObjectType or name; none given, the filter
+        decides.
     exclude_words
-        None of them may be found.
+        None of them stands there.
     label
         What the rule is about, for explanations.
     storeys
         Names or GlobalIds; an element is on the storey it stands on, or without geometry where the file puts it.
     spaces
         Names or GlobalIds; an element is in the space that holds its middle, and where the file puts it.
+    use
+        Words in the names of rooms: the room itself, or one that the element is in, must have one of them.
+    classification
+        Beginnings of codes, of which one must fit: `23.40.20`, `OmniClass: 23-40 20`, or words of a title.
+        Case, spaces, dots and dashes do not count; product and type do, and codes kept in properties.
+    properties
+        Conditions that all must hold, such as `Pset_DoorCommon.FireRating != ''`. `*` stands for anything.
+        The product's own values go before its type's; placeholders count as empty.
+    systems
+        Words in the names of systems that the element, or a system it belongs to, is part of.
+    destination
+        In `Task.targets`: where the robot goes for it; None is the task's.
+    service_time
+        In `Task.targets`: seconds the robot works there; None is the task's.
+    priority
+        In `Task.targets`: how much it matters, 0 or more; None is the task's.
+    due
+        In `Task.targets`: seconds from the beginning of the job within which it should be served; None is
+        the task's.
+    abilities
+        In `Task.targets`: words for what a robot must be able to do there; none is the task's.
     factor
         In `Task.avoid`: what a metre of floor costs there, at least 1.
+    state
+        In `Task.doors`: `locked` doors open for robots with their key only, `closed` ones for robots that
+        open doors, `automatic` and `open` ones for all.
+    opening_time
+        In `Task.doors`: seconds a robot waits until such a door is open.
     expect
         How many elements it must find, such as `>=1`; empty for any number.
     source
@@ -74,17 +158,35 @@ class Rule:
     spaces: tuple[str, ...] = ()
     factor: float = 2.0
     expect: str = ""
+    use: tuple[str, ...] = ()
+    classification: tuple[str, ...] = ()
+    properties: tuple[str, ...] = ()
+    systems: tuple[str, ...] = ()
+    destination: Destination | None = None
+    service_time: float | None = None
+    priority: float | None = None
+    due: float | None = None
+    abilities: tuple[str, ...] = ()
+    state: DoorState = "closed"
+    opening_time: float = 0.0
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("words", "exclude_words", "storeys", "spaces"):
+        for name in ("words", "exclude_words", "storeys", "spaces", "use", "classification", "systems", "abilities"):
             object.__setattr__(self, name, checked_words(getattr(self, name)))
+        object.__setattr__(self, "properties", checked_conditions(self.properties))
+        object.__setattr__(self, "destination", checked_destination("destination", self.destination))
         if not self.filter.strip():
             raise TaskError("a rule has an empty filter.", "IfcElement picks every element.")
         if not 1 <= self.factor < math.inf:
             raise TaskError(f"factor is {self.factor}.", "Give a finite number, at least 1; `restricted` closes floor.")
         if self.expect and not re.search(EXPECT, self.expect):
             raise TaskError(f"expect is {self.expect!r}.", "Write a comparison with a whole number, such as '>=1'.")
+        for name, unit in (("service_time", "seconds"), ("priority", "a number"), ("due", "seconds")):
+            if getattr(self, name) is not None:
+                _check_number(name, getattr(self, name), 0, unit)
+        _check_number("opening_time", self.opening_time, 0, "seconds")
+        _check_known("state", self.state, get_args(DoorState))
 
     def is_met(self, count: int) -> bool:
         """Tell whether that many elements are as many as expected."""
@@ -123,11 +225,22 @@ class Task:
         Ways out of the building.
     docks
         Where the robot waits and charges; a job begins there if nothing else is said.
+    doors
+        How doors are, by the rule's `state`; of several rules that pick a door the first holds.
     service_time
         Seconds the robot works at each target.
     destination
         `center`: drive onto the target's middle if it is free, else stand next to it. `nearest_free`:
-        stand next to it.
+        stand next to it. `standoff`, or a `Standoff`: stand at a distance and face it. `space`: anywhere
+        in the room that the target is.
+    priority
+        How much each target matters.
+    due
+        Seconds from the beginning of the job within which each target should be served; None for no limit.
+    abilities
+        Words for what a robot must be able to do at each target.
+    objective
+        What to keep small: `distance`, `time` or `energy`.
     removes_targets
         Whether the robot takes targets away, as litter: they do not block, and once served they are gone.
     source
@@ -151,6 +264,11 @@ class Task:
     service_time: float = 0.0
     destination: Destination = "center"
     removes_targets: bool = False
+    doors: tuple[Rule, ...] = ()
+    priority: float = 1.0
+    due: float | None = None
+    abilities: tuple[str, ...] = ()
+    objective: Objective = "distance"
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -158,11 +276,31 @@ class Task:
             object.__setattr__(self, name, _rules(name, getattr(self, name)))
         if not self.name.strip():
             raise TaskError("a task has no name.")
-        if not 0 <= self.service_time < math.inf:
-            raise TaskError(f"task {self.name!r}: service_time is {self.service_time}.", "Give seconds, 0 or more.")
-        if self.destination not in get_args(Destination):
-            known = ", ".join(map(repr, get_args(Destination)))
-            raise TaskError(f"task {self.name!r}: destination is {self.destination!r}.", f"Known are {known}.")
+        told = f"task {self.name!r}: "
+        object.__setattr__(self, "abilities", checked_words(self.abilities))
+        _check_number(f"{told}service_time", self.service_time, 0, "seconds")
+        _check_number(f"{told}priority", self.priority, 0, "a number")
+        if self.due is not None:
+            _check_number(f"{told}due", self.due, 0, "seconds")
+        object.__setattr__(self, "destination", checked_destination(f"{told}destination", self.destination))
+        _check_known(f"{told}objective", self.objective, get_args(Objective))
+
+
+def checked_destination(what: str, destination: Any) -> Any:
+    """Return a destination, `standoff` as the one it stands for; it must be a known one."""
+    if destination is not None and not isinstance(destination, Standoff):
+        _check_known(what, destination, get_args(Place))
+    return Standoff() if destination == "standoff" else destination
+
+
+def _check_number(what: str, value: float, low: float, unit: str) -> None:
+    if not low <= value < math.inf:
+        raise TaskError(f"{what} is {value}.", f"Give {unit}, {low} or more.")
+
+
+def _check_known(what: str, value: object, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise TaskError(f"{what} is {value!r}.", f"Known are {', '.join(map(repr, known))}.")
 
 
 def _rules(name: str, rules: Any) -> tuple[Rule, ...]:
