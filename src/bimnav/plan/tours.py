@@ -9,49 +9,17 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from bimnav import search
-from bimnav.errors import InputError, NoPathError, ValueRangeError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
+from bimnav.plan.orders import gap_of, order_stops
 from bimnav.plan.paths import Algorithm, Path, distance_matrix, find_path, free_index
 from bimnav.stops import Stop, Unreached
 
-__all__ = ["StopOrder", "Tour", "order_stops", "plan_tour"]
+__all__ = ["Tour", "plan_tour"]
 
 _SAME_POINT = 1e-9  # metres
-_PROVED = 1e-9  # relative; a smaller gap is rounding
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StopOrder:
-    """In which order to visit the rows of a matrix.
-
-    Parameters
-    ----------
-    order
-        Row numbers, the start first; a return to it is not listed.
-    length
-        Sum of the matrix along the order, with the way back if there is one.
-    bound
-        No order is shorter than this.
-    is_optimal
-        Whether no order is shorter: proved, not hoped.
-    is_cut_short
-        Whether the time limit ended the search before its work was done.
-    """
-
-    order: tuple[int, ...]
-    length: float
-    bound: float
-    is_optimal: bool
-    is_cut_short: bool = False
-
-    @property
-    def gap(self) -> float:
-        """How much longer than the bound, as a fraction of it."""
-        return _gap(self.length, self.bound)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +72,7 @@ class Tour:
     @property
     def gap(self) -> float:
         """How much the tour costs beyond the lower bound, as a fraction of it."""
-        return _gap(self.cost, self.lower_bound)
+        return gap_of(self.cost, self.lower_bound)
 
     @cached_property
     def route(self) -> tuple[NDArray[np.float64], ...]:
@@ -123,71 +91,6 @@ class Tour:
             _polyline(leg, begins[k], ends[k], skip_first=k > 0 and blocked[k - 1], skip_last=blocked[k])
             for k, leg in enumerate(self.legs)
         )
-
-
-def order_stops(
-    matrix: ArrayLike,
-    start: int = 0,
-    *,
-    end: int | None = None,
-    return_to_start: bool = False,
-    time_limit: float | None = None,
-) -> StopOrder:
-    """Find a short order in which to visit all rows of a matrix.
-
-    Up to 15 rows besides start and end the order is a shortest one, proved. For more it is a good one:
-    local search with a fixed amount of work, and a lower bound that says how good. Equal inputs give
-    equal orders unless a time limit cuts the search short.
-
-    Parameters
-    ----------
-    matrix : (n, n) float
-        Cost from row to column, at least 0; inf where there is no way. Need not be symmetric.
-    start
-        The first row.
-    end
-        The last row; None for any.
-    return_to_start
-        Whether the way back from the last row to the first counts.
-    time_limit
-        Seconds after which to stop improving; a result that was cut short says so.
-
-    Raises
-    ------
-    ValueRangeError
-        If a number is negative or not a number, or start or end is no row.
-    NoPathError
-        If no order with a finite length was found.
-
-    Examples
-    --------
-    >>> order_stops([[0, 9, 1], [9, 0, 2], [1, 2, 0]]).order
-    (0, 2, 1)
-    """
-    cost = np.array(matrix, dtype=np.float64)
-    if cost.ndim != 2 or cost.shape[0] != cost.shape[1] or not cost.size:
-        raise InputError(f"a matrix of shape {cost.shape} orders nothing.", "Give (n, n) costs, at least one row.")
-    if np.isnan(cost).any() or (cost < 0).any():
-        raise ValueRangeError("the matrix has costs below 0 or not a number.", "Give costs of at least 0, or inf.")
-    for name, row in (("start", start), ("end", end)):
-        if row is not None and not 0 <= row < len(cost):
-            raise ValueRangeError(f"{name} is {row}, the matrix has rows 0 to {len(cost) - 1}.")
-    if end is not None and return_to_start and end != start:
-        raise InputError("a tour cannot both end elsewhere and return.", "Give end or return_to_start, not both.")
-    np.fill_diagonal(cost, 0.0)
-    if end == start:
-        end, return_to_start = None, True
-    found = search.order_rows(cost, start, end, return_to_start, time_limit)
-    along = [*found.order, start] if return_to_start else found.order
-    length = math.fsum(cost[along[:-1], along[1:]])
-    if not math.isfinite(length):
-        raise NoPathError(
-            f"no order of the {len(cost)} rows has a finite length.",
-            "Leave out the rows that cannot be reached, or cannot be left.",
-        )
-    is_optimal = found.bound >= length * (1 - _PROVED)
-    bound = length if is_optimal else max(found.bound, 0.0)
-    return StopOrder(tuple(found.order.tolist()), length, bound, is_optimal, found.is_cut_short)
 
 
 def plan_tour(
@@ -247,12 +150,6 @@ def plan_tour(
     legs = tuple(find_path(graph, begin, end, algorithm=algorithm) for begin, end in pairwise(places))
     point = graph.frame.center_of(start) if start_point is None else start_point
     return Tour(graph, start, point, visits, legs, tuple(unreached), order.is_optimal, order.bound, return_to_start)
-
-
-def _gap(length: float, bound: float) -> float:
-    if length <= bound:
-        return 0.0
-    return length / bound - 1 if bound > 0 else math.inf
 
 
 def _why_unreached(graph: NavGraph, start: Cell, cell: Cell) -> str:

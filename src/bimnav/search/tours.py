@@ -1,5 +1,5 @@
 # mypy: disable-error-code="assignment, no-any-return, operator, return-value"
-"""Round trips: exact for few stops, improved from a good beginning for many, and bounds from below.
+"""Round trips: improved from a good beginning, and bounds from below.
 
 A tour is an order of the rows of a square matrix of costs, and returns to its first.
 """
@@ -11,46 +11,10 @@ from numpy.typing import NDArray
 
 from bimnav.search.compiled import kernel, lean
 
-__all__ = ["best_order", "climb", "nearest_first", "one_tree_bound"]
+__all__ = ["climb", "nearest_first", "one_tree_bound"]
 
 _GAIN = 1e-9  # relative; a smaller gain is rounding
 _STRETCH = 50  # rows; a kick swaps two neighboring stretches of at most this length
-
-
-@kernel
-def best_order(cost: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return the cheapest order of all rows from row 0 back to row 0, proved; ties go to low numbers.
-
-    Held and Karp, A dynamic programming approach to sequencing problems, 1962. For up to 16 rows.
-    """
-    last = len(cost) - 1  # rows 1.. are the stops; bit k stands for row k + 1
-    best = np.empty((1 << last, last))  # [stops visited, the last of them]
-    best[:] = np.inf
-    for k in range(last):
-        best[1 << k, k] = cost[0, k + 1]
-    for visited in range(1, 1 << last):
-        for k in range(last):
-            so_far = best[visited, k]
-            if so_far == np.inf:
-                continue
-            for other in range(last):
-                if not visited >> other & 1:
-                    total = so_far + cost[k + 1, other + 1]
-                    if total < best[visited | 1 << other, other]:
-                        best[visited | 1 << other, other] = total
-    order = np.zeros(last + 1, dtype=np.int32)
-    visited, after = (1 << last) - 1, 0
-    for place in range(last, 0, -1):
-        chosen = 0
-        for k in range(last):
-            if not visited >> chosen & 1 or (
-                visited >> k & 1
-                and best[visited, k] + cost[k + 1, after] < best[visited, chosen] + cost[chosen + 1, after]
-            ):
-                chosen = k
-        order[place] = after = chosen + 1
-        visited ^= 1 << chosen
-    return order
 
 
 @kernel
