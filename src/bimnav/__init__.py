@@ -49,13 +49,19 @@ if TYPE_CHECKING:
     from bimnav.inspection import inspect as inspect
     from bimnav.mission import Mission as Mission, run as run
     from bimnav.plan import (
+        Assignment as Assignment,
+        Charge as Charge,
         Path as Path,
+        StopOrder as StopOrder,
+        TeamPlan as TeamPlan,
         Tour as Tour,
+        assign_stops as assign_stops,
         distance_field as distance_field,
         distance_matrix as distance_matrix,
         find_path as find_path,
         order_stops as order_stops,
         plan_tour as plan_tour,
+        plan_tours as plan_tours,
     )
     from bimnav.plot import plot_environment as plot_environment, plot_graph as plot_graph, plot_tour as plot_tour
     from bimnav.readiness import (
@@ -96,7 +102,10 @@ _HOMES = {
     "bimnav._start": "Start find_start",
     "bimnav.ifc._federate": "federate",
     "bimnav.mission": "Mission run",
-    "bimnav.plan": "Path Tour distance_field distance_matrix find_path order_stops plan_tour",
+    "bimnav.plan": (
+        "Assignment Charge Path StopOrder TeamPlan Tour assign_stops distance_field distance_matrix find_path "
+        "order_stops plan_tour plan_tours"
+    ),
     "bimnav.plot": "plot_environment plot_graph plot_tour",
     "bimnav.readiness": "DoorCheck Readiness RoomCheck StoreyCheck doors_of",
     "bimnav.robot": "Robot",

@@ -78,11 +78,13 @@ class Stop:
     service_time
         Seconds the robot works there; None for the task's.
     priority
-        How much it matters.
+        Stops of a higher priority are served before those of a lower one.
     due
-        Seconds from the beginning of the job within which it should be served; None for no limit.
+        Seconds from the start of the tour by which the work is to be done; None for any time.
     abilities
         What a robot must be able to do there.
+    kind
+        `target`, or `charger`, where the robot fills its battery.
     """
 
     global_id: str
@@ -99,6 +101,7 @@ class Stop:
     priority: float = 1.0
     due: float | None = None
     abilities: tuple[str, ...] = ()
+    kind: Literal["target", "charger"] = "target"
 
     def __post_init__(self) -> None:
         own = Stand(self.cell, self.end, self.distance, self.heading)

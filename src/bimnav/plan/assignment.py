@@ -189,7 +189,7 @@ def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np
 def _trip(robots: Robots, k: int, rows: NDArray[np.intp]) -> NDArray[np.float64]:
     """Return the costs over a robot's start and some rows; the start's column leads to the robot's end."""
     along = np.array([robots.starts[k], *rows])
-    trip = robots.costs[k][np.ix_(along, along)].copy()
+    trip: NDArray[np.float64] = robots.costs[k][np.ix_(along, along)].copy()
     end = robots.ends[k]
     trip[:, 0] = 0.0 if end is None else robots.costs[k][along, end]
     return trip

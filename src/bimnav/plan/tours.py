@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav.errors import InputError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
+from bimnav.plan.charging import Charge, plan_charging
 from bimnav.plan.orders import gap_of, order_stops
 from bimnav.plan.paths import Algorithm, Path, distance_matrix, find_path, free_index
-from bimnav.stops import Stop, Unreached
+from bimnav.robot import Robot
+from bimnav.stops import Stand, Stop, Unreached
 
-__all__ = ["Tour", "plan_tour"]
+__all__ = ["Tour", "find_chargers", "near_stands", "plan_tour", "seconds_at", "why_unreached"]
+
+Point: TypeAlias = tuple[float, float, float]
 
 _SAME_POINT = 1e-9  # metres
+_FARTHER = 0.5  # metres from its target that a place may be beyond the nearest, if it shortens the tour
+_DOCK = 3.0  # metres from a dock at which a robot charges
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +43,7 @@ class Tour:
     stops
         In the order of visiting.
     legs
-        Leg k ends in the cell of stop k; one more leads back if the tour returns.
+        Leg k ends in the cell of stop k; one more leads back if the tour returns, or to its end.
     unreached
         What cannot be served, and why.
     is_optimal
@@ -44,17 +52,23 @@ class Tour:
         No order of these stops costs less than this, metres.
     return_to_start
         Whether the tour ends where it begins.
+    end
+        Cell in which the tour ends, behind its last stop; None if it ends there, or at the start.
+    charges
+        Visits to chargers, which are among the stops, and what they cost.
     """
 
     graph: NavGraph
     start: Cell
-    start_point: tuple[float, float, float]
+    start_point: Point
     stops: tuple[Stop, ...]
     legs: tuple[Path, ...]
     unreached: tuple[Unreached, ...]
     is_optimal: bool
     lower_bound: float
     return_to_start: bool = False
+    end: Cell | None = None
+    charges: tuple[Charge, ...] = ()
 
     def __repr__(self) -> str:
         return f"Tour({len(self.stops)} stops, {len(self.unreached)} unreached, {self.length:.3f} m)"
@@ -74,6 +88,15 @@ class Tour:
         """How much the tour costs beyond the lower bound, as a fraction of it."""
         return gap_of(self.cost, self.lower_bound)
 
+    @property
+    def end_point(self) -> Point:
+        """World point at which the tour ends, metres."""
+        if self.end is not None:
+            return self.graph.frame.center_of(self.end)
+        if self.return_to_start or not self.stops:
+            return self.start_point
+        return self.stops[-1].end
+
     @cached_property
     def route(self) -> tuple[NDArray[np.float64], ...]:
         """What the robot drives: for each leg an (n, 3) polyline in metres, from exact point to exact point.
@@ -84,7 +107,7 @@ class Tour:
         ends = [stop.end for stop in self.stops]
         blocked = [stop.approach == "reach" for stop in self.stops]
         if len(self.legs) > len(self.stops):
-            ends.append(self.start_point)
+            ends.append(self.end_point)
             blocked.append(False)
         begins = [self.start_point, *ends]
         return tuple(
@@ -100,9 +123,16 @@ def plan_tour(
     *,
     algorithm: Algorithm = "auto",
     return_to_start: bool = False,
-    start_point: tuple[float, float, float] | None = None,
+    end: Cell | None = None,
+    start_point: Point | None = None,
+    robot: Robot | None = None,
+    chargers: Iterable[Stop] | None = None,
 ) -> Tour:
     """Plan a cheap tour over stops.
+
+    Of a stop that can be served from several places the best for the tour is taken, none more than half a
+    metre farther from its target than the nearest. Stops of higher priority are served first. Where stops
+    are due, those that cannot be done in time are left out, those of low priority first.
 
     Parameters
     ----------
@@ -116,8 +146,16 @@ def plan_tour(
         As in `find_path`, for the legs.
     return_to_start
         Whether to come back in the end.
+    end
+        Cell in which the tour ends; None for any.
     start_point
         World point at which the robot is, in metres; the middle of its cell if not given.
+    robot
+        Its speed says what can be done when, its battery how far it gets. The default is the one the
+        environment was made for.
+    chargers
+        Where it can fill its battery; None for the docks of the task. The battery is full at the start, and a
+        tenth of it is kept in reserve.
 
     Returns
     -------
@@ -126,33 +164,196 @@ def plan_tour(
 
     Raises
     ------
-    OutsideMapError, StartBlockedError
-        If the start lies outside the map or is blocked.
+    OutsideMapError, StartBlockedError, GoalBlockedError
+        If start or end lies outside the map or is blocked.
+    NoPathError
+        If no path leads from the start to the end.
+    InputError
+        If the tour should both end elsewhere and return.
     """
     free_index(graph, start, "start")
+    if end is not None:
+        if return_to_start and end != start:
+            raise InputError("a tour cannot both end elsewhere and return.", "Give end or return_to_start, not both.")
+        free_index(graph, end, "goal")
+        if graph.components[end] != graph.components[start]:
+            find_path(graph, start, end)  # says why there is no way
+    robot = robot or (Robot() if graph.environment is None else graph.environment.robot)
     unreached: list[Unreached] = []
     if stops is None:
-        stops, lost = graph.stops_from(start)
-        unreached += lost
-    found: dict[Cell, list[Stop]] = {start: []}  # stops that share a cell are visited together
+        stops, lost_targets = graph.stops_from(start)
+        unreached += lost_targets
+    found: dict[tuple[Any, ...], list[Stop]] = {}  # stops with the same places are visited together
     for stop in stops:
-        reason = _why_unreached(graph, start, stop.cell)
-        if reason:
+        places = tuple(stand for stand in near_stands(stop) if not why_unreached(graph, start, stand.cell))
+        if not places:
+            reason = why_unreached(graph, start, stop.cell)
             unreached.append(Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell))
         else:
-            found.setdefault(stop.cell, []).append(stop)
-    cells = list(found)
-    order = order_stops(distance_matrix(graph, cells), return_to_start=return_to_start)
-    visits = tuple(stop for k in order.order for stop in found[cells[k]])
-    places = [start, *(stop.cell for stop in visits)]
-    if return_to_start and visits:
-        places.append(start)
-    legs = tuple(find_path(graph, begin, end, algorithm=algorithm) for begin, end in pairwise(places))
+            cells = tuple(stand.cell for stand in places)
+            due = math.inf if stop.due is None else stop.due
+            found.setdefault((cells, stop.priority, due), []).append(stop)
+    ordered = _ordered(graph, start, end, list(found.items()), robot, return_to_start)
+    for stop in ordered.late:
+        reason = f"it cannot be done within {stop.due:g} s of the start"
+        unreached.append(Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell))
     point = graph.frame.center_of(start) if start_point is None else start_point
-    return Tour(graph, start, point, visits, legs, tuple(unreached), order.is_optimal, order.bound, return_to_start)
+    planned = Tour(
+        graph,
+        start,
+        point,
+        ordered.visits,
+        (),
+        tuple(unreached),
+        ordered.is_optimal,
+        ordered.bound,
+        return_to_start,
+        end,
+    )
+    return _driven(planned, robot, chargers, algorithm)
 
 
-def _why_unreached(graph: NavGraph, start: Cell, cell: Cell) -> str:
+def _driven(tour: Tour, robot: Robot, chargers: Iterable[Stop] | None, algorithm: Algorithm) -> Tour:
+    """Return a tour with visits to chargers where the battery needs them, and with its legs."""
+    graph, start, visits = tour.graph, tour.start, tour.stops
+    goal = start if tour.return_to_start else tour.end
+    unreached, charges = list(tour.unreached), tour.charges
+    if math.isfinite(robot.battery_wh):
+        known = find_chargers(graph, start) if chargers is None else tuple(chargers)
+        visits, charges, flat = _charged(graph, start, goal, visits, robot, known)
+        for stop in flat:
+            reason = f"the battery of {robot.battery_wh:g} Wh does not last, and no charger is near enough"
+            unreached.append(Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell))
+    cells = [start, *(stop.cell for stop in visits)]
+    if goal is not None and (visits or tour.end is not None):
+        cells.append(goal)
+    legs = tuple(find_path(graph, a, b, algorithm=algorithm) for a, b in pairwise(cells))
+    is_optimal = tour.is_optimal and not charges
+    return replace(tour, stops=visits, legs=legs, unreached=tuple(unreached), is_optimal=is_optimal, charges=charges)
+
+
+class _Ordered(NamedTuple):
+    visits: tuple[Stop, ...]
+    late: tuple[Stop, ...]
+    bound: float
+    is_optimal: bool
+
+
+def near_stands(stop: Stop) -> list[Stand]:
+    """Return the places from which a stop is served that are hardly farther from it than the nearest."""
+    nearest = min(stand.distance for stand in stop.candidates)
+    return [stand for stand in stop.candidates if stand.distance <= nearest + _FARTHER]
+
+
+def _ordered(
+    graph: NavGraph,
+    start: Cell,
+    end: Cell | None,
+    found: Sequence[tuple[tuple[Any, ...], list[Stop]]],
+    robot: Robot,
+    return_to_start: bool,
+) -> _Ordered:
+    """Order stops, given by the cells they can be served from, their priority and when they are due."""
+    cells = [start] if end is None else [start, end]
+    group = list(range(len(cells)))
+    columns: list[Point] = [(0.0, math.inf, 0.0)] * len(cells)
+    for number, ((places, priority, due), stops) in enumerate(found, len(cells)):
+        cells += places
+        group += [number] * len(places)
+        columns += [(priority, due, sum(seconds_at(graph, stop) for stop in stops))] * len(places)
+    priority, due, service = np.array(columns).T
+    metres = distance_matrix(graph, cells)
+    is_timed = bool(np.isfinite(due).any())
+    order = order_stops(
+        metres / robot.speed if is_timed else metres,
+        end=None if end is None else 1,
+        return_to_start=return_to_start,
+        groups=group,
+        priority=priority,
+        due=due,
+        service=service if is_timed else None,
+    )
+    first = 1 if end is None else 2
+    visited = [row for row in order.order if row >= first]
+    visits = []
+    for row in visited:
+        for stop in found[group[row] - first][1]:
+            stand = next(stand for stand in stop.candidates if stand.cell == cells[row])
+            visits.append(stop.at(stand))
+    late = tuple(stop for row in order.left_out for stop in found[group[row] - first][1])
+    bound = order.bound
+    if is_timed:
+        bound = max(bound - math.fsum(service[visited]), 0.0) * robot.speed
+    return _Ordered(tuple(visits), late, bound, order.is_optimal)
+
+
+def seconds_at(graph: NavGraph, stop: Stop) -> float:
+    """Return how long a robot works at a stop: what the stop says, else the task."""
+    if stop.service_time is not None:
+        return stop.service_time
+    return 0.0 if graph.environment is None else graph.environment.task.service_time
+
+
+def find_chargers(graph: NavGraph, start: Cell) -> tuple[Stop, ...]:
+    """Return the docks of the task that can be reached from a start, each as a stop on the nearest free cell."""
+    environment = graph.environment
+    if environment is None:
+        return ()
+    from bimnav.tasks import match
+
+    reachable = graph.components == graph.components[start]
+    chargers = []
+    for rule in environment.task.docks:
+        for dock, _ in match(rule, environment.building):
+            if dock.bounds is None:
+                continue
+            x, y = dock.bounds[:, :2].mean(axis=0).tolist()
+            storey = graph.frame.storey_at(float(dock.bounds[0, 2]))
+            rows, cols = np.nonzero(reachable[storey])
+            centers = graph.frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
+            distance = np.round(np.hypot(centers[:, 0] - x, centers[:, 1] - y), 9)
+            if not len(distance) or distance.min() > _DOCK:
+                continue
+            k = int(np.lexsort((cols, rows, distance))[0])
+            cell = Cell(storey, int(rows[k]), int(cols[k]))
+            point = graph.frame.center_of(cell)
+            destination = (x, y, point[2])
+            away = float(distance[k])
+            chargers.append(Stop(dock.global_id, dock.name, cell, destination, point, "standing", away, kind="charger"))
+    return tuple(chargers)
+
+
+def _charged(
+    graph: NavGraph,
+    start: Cell,
+    goal: Cell | None,
+    visits: tuple[Stop, ...],
+    robot: Robot,
+    chargers: tuple[Stop, ...],
+) -> tuple[tuple[Stop, ...], tuple[Charge, ...], tuple[Stop, ...]]:
+    """Return the stops with visits to chargers in between, what those cost, and the stops that cannot be done."""
+    cells = [start, *(stop.cell for stop in visits), *([] if goal is None or not visits else [goal])]
+    metres = distance_matrix(graph, [*cells, *(charger.cell for charger in chargers)])
+    n = len(cells)
+    service = [seconds_at(graph, stop) for stop in visits] + [0.0] * (n - 1 - len(visits))
+    back = np.roll(metres[n:, :n], -1, axis=1)  # column k leads to stop k
+    found = plan_charging(robot, np.diagonal(metres, 1)[: n - 1], service, metres[:n, n:].T, back)
+    along: list[Stop] = []
+    charges = []
+    planned = dict(zip(found.visits, found.charges, strict=True))
+    for done in range(min(found.done, len(visits)) + 1):
+        for (after, which), (detour, energy, seconds) in planned.items():
+            if after == done:
+                charger = chargers[which]
+                charges.append(Charge(charger.global_id, charger.name, len(along), detour, energy, seconds))
+                along.append(replace(charger, service_time=seconds))
+        if done < min(found.done, len(visits)):
+            along.append(visits[done])
+    return tuple(along), tuple(charges), visits[found.done :]
+
+
+def why_unreached(graph: NavGraph, start: Cell, cell: Cell) -> str:
+    """Say why a cell cannot be reached from a start; nothing if it can."""
     if cell not in graph.frame:
         return "its cell lies outside the map"
     if not graph.free[cell]:
@@ -165,8 +366,8 @@ def _why_unreached(graph: NavGraph, start: Cell, cell: Cell) -> str:
 
 def _polyline(
     leg: Path,
-    begin: tuple[float, float, float],
-    end: tuple[float, float, float],
+    begin: Point,
+    end: Point,
     *,
     skip_first: bool,
     skip_last: bool,

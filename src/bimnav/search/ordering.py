@@ -181,9 +181,9 @@ def order_groups(
         other = chosen.copy()
         for k in np.roll(order, -int(rng.integers(len(order))))[:width].tolist():
             other[k] = rng.choice(ways[k])
-        found = settled(other, order.copy(), _KICKS_OF_CHOICE)
-        if found[0] < best:
-            best, chosen, order = found
+        changed = settled(other, order.copy(), _KICKS_OF_CHOICE)
+        if changed[0] < best:
+            best, chosen, order = changed
     return Ordering(trip.order_of(chosen[order]), trip._replace(cost=nearest).bound(), is_cut_short)
 
 

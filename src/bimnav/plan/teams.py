@@ -1,0 +1,156 @@
+"""Tours of several robots that share the work."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bimnav.errors import InputError
+from bimnav.graph import NavGraph
+from bimnav.grid import Cell
+from bimnav.plan.assignment import Objective, assign_stops
+from bimnav.plan.paths import Algorithm, distance_matrix, free_index
+from bimnav.plan.tours import Tour, near_stands, plan_tour, seconds_at, why_unreached
+from bimnav.robot import Robot
+from bimnav.stops import Stand, Stop, Unreached
+
+__all__ = ["TeamPlan", "plan_tours"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TeamPlan:
+    """What each of several robots does.
+
+    The robots know nothing of each other on the way.
+
+    Parameters
+    ----------
+    robots, tours
+        One tour for each robot.
+    objective
+        What was made least: `total`, the metres of all, or `makespan`, the seconds of the one that takes longest.
+    lower_bound
+        No assignment of these stops needs less.
+    is_optimal
+        Whether no assignment needs less: proved, not hoped.
+    unreached
+        What no robot can serve, and why.
+    """
+
+    robots: tuple[Robot, ...]
+    tours: tuple[Tour, ...]
+    objective: Objective
+    lower_bound: float
+    is_optimal: bool
+    unreached: tuple[Unreached, ...]
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{r.name} {len(t.stops)}" for r, t in zip(self.robots, self.tours, strict=True))
+        return f"TeamPlan({counts} stops, {len(self.unreached)} unreached, {self.length:.3f} m)"
+
+    @property
+    def length(self) -> float:
+        """Of all tours, metres."""
+        return math.fsum(tour.length for tour in self.tours)
+
+
+def plan_tours(
+    graph: NavGraph,
+    starts: Sequence[Cell],
+    stops: Iterable[Stop] | None = None,
+    *,
+    robots: Sequence[Robot] | None = None,
+    objective: Objective = "makespan",
+    return_to_start: bool = False,
+    start_points: Sequence[tuple[float, float, float]] | None = None,
+    chargers: Iterable[Stop] | None = None,
+    algorithm: Algorithm = "auto",
+) -> TeamPlan:
+    """Share stops out among robots and plan each one's tour.
+
+    Up to 12 stops the shares are proved best; see `assign_stops`.
+
+    Parameters
+    ----------
+    graph
+        Graph to search. It was cut for one body; robots must not be larger.
+    starts
+        Cell in which each robot is.
+    stops
+        What to visit; None for every target of the graph.
+    robots
+        Their names, speeds, batteries and abilities; None for as many as the environment was made for, with
+        numbered names. A stop is served by a robot that has all abilities it asks for.
+    objective
+        What to make least: `makespan`, until all are done, or `total`, the metres of all.
+    return_to_start, chargers, algorithm
+        As in `plan_tour`.
+    start_points
+        World point of each robot, metres; the middle of its cell if not given.
+
+    Raises
+    ------
+    OutsideMapError, StartBlockedError
+        If a start lies outside the map or is blocked.
+    """
+    for start in starts:
+        free_index(graph, start, "start")
+    if robots is None:
+        one = Robot() if graph.environment is None else graph.environment.robot
+        robots = [replace(one, name=f"R{k + 1}") for k in range(len(starts))]
+    if len(robots) != len(starts):
+        raise InputError(f"there are {len(robots)} robots and {len(starts)} starts.", "Give one start for each robot.")
+    unreached: list[Unreached] = []
+    if stops is None:
+        stops, lost = graph.stops_from(None)
+        unreached += lost
+    rows: list[tuple[Stop, Stand]] = []
+    groups: list[int] = [-1 - k for k in range(len(starts))]
+    allowed = [[True] * len(starts) for _ in starts]
+    for number, stop in enumerate(stops):
+        able = [set(stop.abilities) <= set(robot.abilities) for robot in robots]
+        served = [
+            (stand, [a and not why_unreached(graph, start, stand.cell) for a, start in zip(able, starts, strict=True)])
+            for stand in near_stands(stop)
+        ]
+        served = [(stand, by) for stand, by in served if any(by)]
+        if not served:
+            lacking = f"no robot has the abilities {', '.join(stop.abilities)}"
+            reason = why_unreached(graph, starts[able.index(True)], stop.cell) if any(able) else lacking
+            unreached.append(Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell))
+        for stand, by in served:
+            rows.append((stop, stand))
+            groups.append(number)
+            for k, may in enumerate(by):
+                allowed[k].append(may)
+    metres = distance_matrix(graph, [*starts, *(stand.cell for _, stand in rows)])
+    service = np.array([0.0] * len(starts) + [seconds_at(graph, stop) for stop, _ in rows])
+    costs = [metres if objective == "total" else metres / robot.speed + service for robot in robots]
+    shares = assign_stops(
+        costs,
+        range(len(starts)),
+        return_to_start=return_to_start,
+        groups=groups,
+        allowed=np.array(allowed),
+        objective=objective,
+    )
+    tours = []
+    for k, (robot, route) in enumerate(zip(robots, shares.routes, strict=True)):
+        own = [rows[row - len(starts)][0] for row in route[1:]]
+        tours.append(
+            plan_tour(
+                graph,
+                starts[k],
+                own,
+                algorithm=algorithm,
+                return_to_start=return_to_start,
+                start_point=None if start_points is None else start_points[k],
+                robot=robot,
+                chargers=chargers,
+            )
+        )
+    unreached += [lost for tour in tours for lost in tour.unreached]
+    return TeamPlan(tuple(robots), tuple(tours), objective, shares.bound, shares.is_optimal, tuple(unreached))
