@@ -54,3 +54,12 @@ def test_a_robot_can_be_used_as_a_key_and_pickled():
     robot = Robot(keys=["D1"], outline=[(-1, -1), (1, -1), (0, 1)])
     assert pickle.loads(pickle.dumps(robot)) == robot
     assert hash(robot) == hash(pickle.loads(pickle.dumps(robot)))
+
+
+def test_the_values_of_a_robot_without_limits_are_json():
+    import json
+
+    values = json.loads(json.dumps(Robot(outline=[(-1, -1), (1, -1), (0, 1)]).to_dict(), allow_nan=False))
+    assert values["turn_rate"] is None
+    assert values["step_height"] == 0.05
+    assert len(values["outline"]) == 3

@@ -42,13 +42,7 @@ def report_of(mission: Mission) -> dict[str, Any]:
         "model": " + ".join(building.sources) or building.name,
         "schema": building.schema,
         "task": mission.task.name,
-        "robot": {
-            "name": environment.robot.name,
-            "radius": environment.robot.radius,
-            "height": environment.robot.height,
-            "speed": environment.robot.speed,
-            "step_height": environment.robot.step_height,
-        },
+        "robot": environment.robot.to_dict(),
         "cell_size": graph.frame.cell_size,
         "connectivity": graph.connectivity,
         "storeys": [

@@ -127,7 +127,7 @@ class Readiness:
         rooms = [room for room in self.rooms if room.reason != "shaft"]
         return {
             "building": self.building,
-            "robot": dataclasses.asdict(self.robot),
+            "robot": self.robot.to_dict(),
             "cell_size": self.cell_size,
             "share": {
                 "rooms": _share(sum(room.reached for room in rooms), len(rooms)),

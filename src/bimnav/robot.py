@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
 from bimnav.errors import ValueRangeError
@@ -135,6 +135,11 @@ class Robot:
     def low(self) -> float:
         """Height above the floor from which on things block, metres."""
         return self.step_height if self.ground_clearance is None else min(self.step_height, self.ground_clearance)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return its values by name, ready for JSON; what has no limit is None."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: None if value == math.inf else value for name, value in values.items()}
 
     def _refuse(self, field: str, value: Any, hint: str) -> None:
         raise ValueRangeError(f"robot {self.name!r}: {field} is {value!r}.", hint, {"field": field, "value": value})
