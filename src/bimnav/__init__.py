@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bimnav._georeference import Georeference as Georeference
     from bimnav._start import Start as Start, find_start as find_start
+    from bimnav.assets import Asset as Asset
     from bimnav.building import (
         Building as Building,
         Classification as Classification,
@@ -90,6 +91,7 @@ _HOMES = {
     "bimnav.building": (
         "Building Classification Connector Detection Door Element Facts Issue Ledger Mesh Opening Shape Space Storey"
     ),
+    "bimnav.assets": "Asset",
     "bimnav.detections": "read_targets",
     "bimnav.environment": "IndoorEnvironment Obstacle Region Target Zone make_environment",
     "bimnav.errors": "BimnavError",

@@ -20,6 +20,7 @@ from bimnav.errors import GeometryError, ModelError, ValueRangeError
 
 if TYPE_CHECKING:
     from bimnav._georeference import Georeference
+    from bimnav.assets import Asset
     from bimnav.readiness import Readiness
     from bimnav.robot import Robot
 
@@ -483,6 +484,8 @@ class Building:
         The same for each file of several, by its path.
     facts_reader
         Answers `facts`: a GlobalId to what the model says of the product.
+    asset_readers
+        Answer `asset`, for each file by its path: a GlobalId to what the file says about operating it.
     georeference
         Where on Earth the model lies, if it says so.
     anchors
@@ -505,6 +508,7 @@ class Building:
     selector: Callable[[str], Iterable[str]] | None = None
     property_reader: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None
     property_readers: Mapping[str, Callable[[str], Mapping[str, Mapping[str, Any]]]] = field(default_factory=dict)
+    asset_readers: Mapping[str, Callable[[str], Mapping[str, Any]]] = field(default_factory=dict)
     georeference: Georeference | None = None
     anchors: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     facts_reader: Callable[[str], Facts] | None = None
@@ -578,6 +582,18 @@ class Building:
             readers = {self.sources[0] if self.sources else self.name: self.property_reader}
         found = {path: read(global_id) for path, read in readers.items()}
         return {path: sets for path, sets in found.items() if sets}
+
+    def asset(self, global_id: str) -> Asset:
+        """Return what the models say about operating and maintaining an element or a room.
+
+        Raises
+        ------
+        ModelError
+            If nothing has this GlobalId.
+        """
+        from bimnav.assets import read_asset
+
+        return read_asset(self, global_id)
 
     def readiness(self, robot: Robot | None = None, *, cell_size: float = 0.05) -> Readiness:
         """Say which rooms, doors and floor a robot reaches, and why not the rest; see `readiness`."""

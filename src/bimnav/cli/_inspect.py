@@ -20,12 +20,16 @@ def add_to(commands: Commands) -> None:
     inspect.add_argument("--html", metavar="FILE", help="write the readiness report as a page")
     inspect.add_argument("--radius", type=length, default=0.25, help="of that robot (default: 0.25)")
     inspect.add_argument("--height", type=length, default=1.0, help="of that robot (default: 1)")
+    inspect.add_argument("--asset", metavar="GLOBAL_ID", help="print the asset card of an element or a room")
+    inspect.add_argument("--upstream", metavar="KIND", help="with --asset: the way to the first valve, breaker, ...")
     inspect.add_argument("--json", action="store_true")
     inspect.set_defaults(command=_command)
 
 
 def _command(options: argparse.Namespace) -> int:
     building = bn.read_ifc(options.models)
+    if options.asset is not None:
+        return _asset(building, options)
     if options.readiness or options.html:
         return _readiness(building, options)
     report = bn.inspect(building)
@@ -47,6 +51,20 @@ def _command(options: argparse.Namespace) -> int:
             f"  {issue['severity']}: {issue['message']} {issue['hint']} {f'[{some}]' if some else ''}".rstrip()
         )
     show("\n".join(lines))
+    return DONE
+
+
+def _asset(building: bn.Building, options: argparse.Namespace) -> int:
+    asset = building.asset(options.asset)
+    way = asset.find_upstream(options.upstream) if options.upstream else ()
+    if options.json:
+        card = asset.to_dict()
+        show_json(card | {"way_upstream": [each._asdict() for each in way]} if options.upstream else card)
+        return DONE
+    show(repr(asset))
+    if options.upstream:
+        steps = " > ".join(f"{each.name or each.ifc_class} ({each.global_id})" for each in way)
+        show(f"  first {options.upstream} upstream: {steps or 'none is connected'}")
     return DONE
 
 

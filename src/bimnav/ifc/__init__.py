@@ -111,6 +111,7 @@ def _building_of(
         selector=selector.select,
         property_reader=selector.properties,
         facts_reader=selector.facts,
+        asset_readers={str(path): selector.assets},
     )
 
 

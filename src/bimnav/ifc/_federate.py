@@ -104,6 +104,7 @@ def federate(buildings: Sequence[Building], *, offsets: Sequence[ArrayLike | Non
         property_reader=answers.properties,
         property_readers=answers.readers,
         facts_reader=answers.facts,
+        asset_readers=_united(building.asset_readers for building in buildings),
     )
 
 

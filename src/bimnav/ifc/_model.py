@@ -75,6 +75,7 @@ def to_building(
     selector: Callable[[str], Iterable[str]] | None = None,
     property_reader: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None,
     facts_reader: Callable[[str], Facts] | None = None,
+    asset_readers: Mapping[str, Callable[[str], Mapping[str, Any]]] | None = None,
 ) -> Building:
     """Turn tables and arrays into the values the rest of the library works on.
 
@@ -82,7 +83,7 @@ def to_building(
     ----------
     sources
         Paths of the files the model was read from.
-    selector, property_reader, facts_reader
+    selector, property_reader, facts_reader, asset_readers
         As in `Building`.
     """
     tables = model.tables
@@ -124,6 +125,7 @@ def to_building(
         selector=selector,
         property_reader=property_reader,
         facts_reader=facts_reader,
+        asset_readers=asset_readers or {},
     )
 
 

@@ -43,6 +43,7 @@ class Selector:
         self._known: dict[str, Facts] = {}
         self._opened: Any = None
         self._read_facts: Any = None
+        self._assets: Any = None
 
     def __reduce__(self) -> tuple[type[Selector], tuple[Path, str, dict[int, str]]]:
         return type(self), (self._path, self._sha256, self._ids)
@@ -85,6 +86,15 @@ class Selector:
         if self._read_facts is None:
             self._read_facts = FactsReader()
         facts: Facts = self._read_facts(self._file.by_id(self._step_ids[global_id]))
+        return facts
+
+    def assets(self, global_id: str) -> dict[str, Any]:
+        """Return what the file says about operating and maintaining a product; see `AssetIndex.facts`."""
+        if self._assets is None:
+            from bimnav.ifc._assets import AssetIndex
+
+            self._assets = AssetIndex(self._file, self._ids)
+        facts: dict[str, Any] = self._assets.facts(global_id)
         return facts
 
     @property
