@@ -229,7 +229,7 @@ def test_a_building_written_by_hand_has_cards_too():
     pump = box("pump", 1, 1, 0, 2, 2, 1, name="Pump")
     building = replace(room(elements=[pump]), property_reader=lambda g: {"Mine": {"Hersteller": "Works <&>"}})
     card = building.asset("pump")
-    assert (card.maker, card.space, card.storey) == ("Works <&>", "space", "")
+    assert (card.maker, card.space, card.storey) == ("Works <&>", "space", "Ground floor")
     assert "Works &lt;&amp;&gt;" in card._repr_html_()
     assert "maker" in repr(card)
     assert not card.is_empty

@@ -105,7 +105,7 @@ class Asset:
     global_id, name, ifc_class, type_name, tag
         The element.
     storey, space
-        Where it is: names; the space by the file, else by where its middle lies.
+        Where it is: names, by the file, else by its geometry.
     maker, model, article, serial_number, barcode, asset_id
         What it is. A maker written as an e-mail address is followed by the name of the contact.
     installed, made
@@ -284,7 +284,6 @@ def read_asset(building: Building, global_id: str) -> Asset:
     product = _product(building, global_id)
     facts = _facts(building, global_id)
     values, sources = _values(facts)
-    storey = next((s.name for s in building.storeys if s.global_id == product.storey), "")
     spares = [(name, f"spare parts in {file}") for file, told in facts for name in told.get("spares", ())]
     spares += [(values["spare_parts"], sources["spare_parts"])] if "spare_parts" in values else []
     documents = [
@@ -313,7 +312,7 @@ def read_asset(building: Building, global_id: str) -> Asset:
         product.ifc_class,
         product.type_name,
         product.tag,
-        storey=storey,
+        storey=_storey_of(building, product),
         space=_room_of(building, product),
         spare_parts=tuple(dict.fromkeys(name for name, _ in spares)),
         documents=tuple(dict.fromkeys(documents)),
@@ -545,6 +544,15 @@ def _test_of(building: Building, kind: str) -> Callable[[str], bool]:
         return any(word in haystack(text) for text in texts if text for word in sought)
 
     return is_it
+
+
+def _storey_of(building: Building, product: Element | Space) -> str:
+    """Return the name of the storey that the file says, else of the highest one below the element."""
+    stated = next((storey.name for storey in building.storeys if storey.global_id == product.storey), "")
+    if stated or product.bounds is None:
+        return stated
+    low = float(product.bounds[0, 2]) + _BESIDE
+    return next((storey.name for storey in reversed(building.storeys) if storey.elevation <= low), "")
 
 
 def _room_of(building: Building, product: Element | Space) -> str:
