@@ -1,8 +1,10 @@
 """Tasks: what the rules pick by name, and what task files may say."""
 
 import json
+import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,8 @@ from bimnav.errors import (
     TaskError,
 )
 from bimnav.tasks import Rule, Standoff, Task, list_tasks, load_task, match, task_schema
+from bimnav.tasks._lint import lint_filters
+from bimnav.tasks._toml import read_toml
 from tests.conftest import real_model
 
 # what a robot that cleans is to find: names as exporters write them
@@ -441,6 +445,7 @@ def test_all_mistakes_are_told_at_once_each_with_its_line(tmp_path):
         "22: tasks.c = 3: should be a table.",
     ]
     assert caught.value.context["problems"][0] == {
+        "file": str(path),
         "line": 1,
         "message": "schema = 2: should be 1.",
         "key": "schema",
@@ -751,3 +756,161 @@ def test_a_target_and_its_stop_carry_what_their_rule_asks():
     assert (sofa.label, sofa.priority, sofa.due, sofa.service_time, sofa.abilities) == ("sofas", 3, 60, 5, ("arm",))
     assert (table.priority, table.due, table.service_time, table.abilities) == (1, None, None, ("camera",))
     assert sofa.approach == table.approach == Standoff()
+
+
+# tasks built on tasks, and folders of tasks
+
+
+def test_a_task_extends_another_its_rules_behind_and_its_keys_over_it(tmp_path):
+    path = written(
+        tmp_path,
+        """schema = 1
+[tasks.night]
+extends = "cleaning"
+service_time = 90
+[[tasks.night.targets]]
+words = ["leaves"]
+[tasks.later]
+extends = "night"
+[[tasks.later.avoid]]
+words = ["carpet"]
+""",
+    )
+    base, night, later = load_task("cleaning"), load_task(path, "night"), load_task(path, "later")
+    assert night.targets == (*base.targets, Rule(words=("leaves",)))
+    assert (night.service_time, night.removes_targets, night.docks) == (90, base.removes_targets, base.docks)
+    assert night.targets[0].source.startswith("built-in cleaning.toml:")
+    assert night.targets[-1].source == f"{path}:5"
+    assert (later.targets, later.service_time, later.name) == (night.targets, 90, "later")
+    assert later.avoid == (Rule(words=("carpet",)),)
+
+
+def test_a_file_may_extend_a_known_task_under_its_own_name(tmp_path):
+    path = written(tmp_path, 'schema = 1\n[tasks.cleaning]\nextends = "cleaning"\nservice_time = 5\n')
+    assert load_task(path).targets == load_task("cleaning").targets
+    assert load_task(path).service_time == 5
+
+
+def test_extending_in_a_circle_or_what_is_not_there_is_refused_beside_all_else(tmp_path):
+    path = written(
+        tmp_path,
+        """schema = 1
+[tasks.a]
+extends = "b"
+[tasks.b]
+extends = "c"
+[tasks.c]
+extends = "a"
+[tasks.d]
+extends = "cleanin"
+[tasks.e]
+extends = "e"
+colour = 1
+""",
+    )
+    with pytest.raises(TaskError) as caught:
+        load_task(path)
+    lines = [line.split("my.toml:")[1] for line in caught.value.message.split("\n")]
+    assert lines[0] == "7: tasks.c.extends = 'a': goes round: 'a' extends 'b' extends 'c' extends 'a'."
+    assert lines[1].startswith("9: tasks.d.extends = 'cleanin': there is no such task. Did you mean 'cleaning'?")
+    assert lines[2].startswith("11: tasks.e.extends = 'e': there is no such task.")
+    assert lines[3].startswith("12: unknown key 'colour'")
+    assert caught.value.context["problems"][0]["key"] == "tasks.c.extends"
+
+
+def folder_of(tmp_path, **texts):
+    folder = tmp_path / "tasks"
+    folder.mkdir()
+    for name, text in texts.items():
+        (folder / f"{name}.toml").write_text(f"schema = 1\n{text}", encoding="utf-8")
+    return folder
+
+
+def test_tasks_of_users_own_folders_are_known_by_name(tmp_path, monkeypatch):
+    folder = folder_of(tmp_path, one="[tasks.rounds]\n", two="[tasks.night]\nextends = 'cleaning'\n")
+    single = tmp_path / "single.toml"
+    single.write_text("schema = 1\n[tasks.lone]\n")
+    assert load_task("rounds", tasks_path=[folder]) == Task("rounds")
+    names = {info.name for info in list_tasks(tasks_path=[folder])}
+    assert {"cleaning", "night", "rounds"} <= names
+    monkeypatch.setenv("BIMNAV_TASKS", f"{folder}{os.pathsep}{single}")
+    assert {*names, "lone"} == {info.name for info in list_tasks()}
+    assert load_task("night").targets == load_task("cleaning").targets
+    other = tmp_path / "other.toml"
+    other.write_text("schema = 1\n[tasks.mine]\nextends = 'night'\n")
+    assert load_task(other).removes_targets
+
+
+def test_two_tasks_of_one_name_are_refused_with_both_places(tmp_path):
+    folder = folder_of(tmp_path, one="[tasks.rounds]\n", two="[tasks.rounds]\n", three="[tasks.cleaning]\n")
+    with pytest.raises(TaskError) as caught:
+        load_task("rounds", tasks_path=[folder])
+    three, two = caught.value.message.split("\n")
+    assert three.startswith(
+        f"{folder / 'three.toml'}:2: there is a task 'cleaning' already, at built-in cleaning.toml:"
+    )
+    assert two == (
+        f"{folder / 'two.toml'}:2: there is a task 'rounds' already, at {folder / 'one.toml'}:2; "
+        "give this one another name."
+    )
+
+
+def test_a_folder_of_tasks_that_is_not_there_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("BIMNAV_TASKS", str(tmp_path / "nowhere"))
+    with pytest.raises(FileMissingError, match=r"nowhere does not exist.*BIMNAV_TASKS"):
+        list_tasks()
+    assert load_task("cleaning")
+
+
+def test_mistakes_in_filters_are_told_with_those_in_keys(tmp_path):
+    path = written(
+        tmp_path,
+        """schema = 1
+[tasks.a]
+colour = 1
+[[tasks.a.targets]]
+filter = "IfcFurnitur"
+[[tasks.a.targets]]
+words = ["x"]
+filter = 'query:system.Name="x"'
+[[tasks.a.ignore]]
+filter = "Name=x, IfcWall"
+""",
+    )
+    with pytest.raises(TaskError) as caught:
+        load_task(path)
+    lines = [line.split("my.toml:")[1] for line in caught.value.message.split("\n")]
+    assert [line.split(":")[0] for line in lines] == ["3", "5", "8"]
+    assert lines[1] == (
+        "5: tasks.a.targets[0]: filter 'IfcFurnitur' names an unknown class IfcFurnitur (column 1). "
+        "Did you mean IfcFurniture?"
+    )
+
+
+def test_the_filters_of_the_library_have_nothing_wrong_with_them():
+    library = Path(sys.modules["bimnav.tasks"].__file__).parent / "library"
+    for path in library.glob("*.toml"):
+        assert lint_filters(read_toml(path.read_text(encoding="utf-8"))) == ([], [])
+
+
+def test_a_rule_for_a_class_the_schema_lacks_picks_nothing_and_says_so():
+    def select(query):
+        raise SelectorError(f"filter {query!r} names it", "", {"schema": "IFC2X3"})
+
+    building = replace(building_of([("IfcFlowTerminal", "Speaker", "")]), selector=select, schema="IFC2X3")
+    task = Task("look", targets=[Rule("IfcAudioVisualAppliance", label="speakers"), Rule("IfcValve")])
+    environment = make_environment(building, task)
+    assert environment.targets == ()
+    told = [(issue.severity, issue.message) for issue in environment.issues if issue.code == "filter"]
+    assert told == [
+        (
+            "warning",
+            "rule 'speakers': filter 'IfcAudioVisualAppliance' names IfcAudioVisualAppliance, which IFC2X3 does not "
+            "have (column 1). No element of this model can have it; name another class too, or match names.",
+        ),
+        (
+            "info",
+            "rule 'IfcValve': filter 'IfcValve' names IfcValve, which IFC2X3 does not have; what has an IfcValveType "
+            "is taken for it (column 1).",
+        ),
+    ]

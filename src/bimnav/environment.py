@@ -312,10 +312,11 @@ def make_environment(
         Whether the ground around the building is floor too: slabs and terrain as high as a level, else a
         margin of two metres around the lowest level with a door to the outside.
     """
-    from bimnav.tasks import match
+    from bimnav.tasks import lint_rules, match
 
     robot = robot or Robot()
     floors, issues = find_floors(building, robot, sources=floor_from, outdoors=outdoors)
+    issues += lint_rules(task, building)
     levels = tuple(floor.level for floor in floors)
     regions = tuple(
         Region(piece.global_id, piece.name, storey, piece.polygon, piece.source)

@@ -1,6 +1,7 @@
 """Tasks: what a robot is to visit in any building, what blocks it, and why each element was picked."""
 
 from bimnav.tasks._files import TaskInfo, list_tasks, load_task, task_schema
+from bimnav.tasks._lint import lint_rules
 from bimnav.tasks._match import Match, match
 from bimnav.tasks._task import Destination, Rule, Standoff, Task
 
@@ -11,6 +12,7 @@ __all__ = [
     "Standoff",
     "Task",
     "TaskInfo",
+    "lint_rules",
     "list_tasks",
     "load_task",
     "match",

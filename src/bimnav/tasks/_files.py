@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+import logging
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.resources import files
+from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from bimnav.errors import FileKindError, FileMissingError, FileTooLargeError, InputError, TaskError
 from bimnav.tasks._task import RULE_LISTS, Rule, Standoff, Task
@@ -18,10 +21,18 @@ from bimnav.tasks._toml import Problem, Toml, read_toml
 if TYPE_CHECKING:
     from bimnav.tasks._schema import RuleTable, TaskTable
 
-__all__ = ["TaskInfo", "list_tasks", "load_task", "task_schema"]
+__all__ = ["VARIABLE", "FileCheck", "TaskInfo", "check_file", "list_tasks", "load_task", "task_schema"]
+
+_LOG = logging.getLogger(__name__)
+
+VARIABLE = "BIMNAV_TASKS"
+"""The environment variable that holds users' own folders and files of tasks."""
 
 _LARGEST = 1_000_000  # bytes; the built-in library is a hundredth of it
 _MOST = 50  # mistakes, or names, told in one message
+
+Folders: TypeAlias = Iterable[str | PathLike[str]]
+Known: TypeAlias = Callable[[], Mapping[str, Task]]
 
 
 class TaskInfo(NamedTuple):
@@ -32,22 +43,66 @@ class TaskInfo(NamedTuple):
     source: str
 
 
-def list_tasks() -> tuple[TaskInfo, ...]:
-    """Return the built-in tasks, by name."""
-    return tuple(TaskInfo(task.name, task.description, task.source) for task in _library().values())
+class FileCheck(NamedTuple):
+    """What a task file holds and what is wrong with it.
+
+    Parameters
+    ----------
+    tasks
+        By name; empty if there is any problem.
+    problems
+        Mistakes, each with its line.
+    warnings
+        What may not do what is meant.
+    """
+
+    tasks: Mapping[str, Task]
+    problems: tuple[Problem, ...]
+    warnings: tuple[Problem, ...]
 
 
-def load_task(task: str | Path, name: str | None = None) -> Task:
+@dataclass(frozen=True, slots=True)
+class _File:
+    """The tables of one text, checked one by one."""
+
+    source: str
+    toml: Toml
+    tables: Mapping[str, TaskTable]
+    problems: tuple[Problem, ...]
+    warnings: tuple[Problem, ...] = ()
+
+
+def list_tasks(*, tasks_path: Folders = ()) -> tuple[TaskInfo, ...]:
+    """Return the tasks that are known by name: the built-in ones, and those of users' own folders.
+
+    Parameters
+    ----------
+    tasks_path
+        Folders of task files, or task files, besides those that the environment variable `BIMNAV_TASKS`
+        lists.
+
+    Raises
+    ------
+    TaskError
+        If a file has mistakes, or two tasks have one name.
+    """
+    return tuple(TaskInfo(task.name, task.description, task.source) for task in _known(tasks_path).values())
+
+
+def load_task(task: str | Path, name: str | None = None, *, tasks_path: Folders = ()) -> Task:
     """Load a task.
 
     Parameters
     ----------
     task
-        Name of a built-in task, or path of a task file: a `Path`, or a text with a folder in it or the
-        suffix `.toml`.
+        Name of a task, or path of a task file: a `Path`, or a text with a folder in it or the suffix
+        `.toml`.
     name
         Which task of the file; needed if it holds several. It may stand behind the path, too:
         `my.toml:kitchen`.
+    tasks_path
+        Folders of task files, or task files, where names are sought besides the built-in ones and those
+        that the environment variable `BIMNAV_TASKS` lists.
 
     Raises
     ------
@@ -58,20 +113,28 @@ def load_task(task: str | Path, name: str | None = None) -> Task:
         If the file cannot be read at all.
     """
     if isinstance(task, str):
-        known = _library()
-        if name is None and task in known:
-            return known[task]
         before, parted, behind = task.rpartition(".toml:")
         if parted and name is None:
             task, name = f"{before}.toml", behind
         if not task.endswith(".toml") and "/" not in task and "\\" not in task:
-            raise TaskError(
-                f"there is no task {task!r}.",
-                f"{_nearest(task, known)} For a task of your own give the path of a .toml file.",
-                {"name": task, "known": list(known)},
-            )
+            return _named(task, name, _library() if task in _library() else _known(tasks_path))
     path = Path(task)
-    return _chosen(_tasks(_text_of(path), str(path)), name, str(path))
+    tasks = _tasks([_read(_text_of(path), str(path))], lambda: _known(tasks_path))
+    return _chosen(tasks, name, str(path))
+
+
+def check_file(path: str | PathLike[str], *, tasks_path: Folders = ()) -> FileCheck:
+    """Return what a task file holds and what is wrong with it.
+
+    Raises
+    ------
+    FileMissingError, FileKindError, FileTooLargeError
+        If the file cannot be read at all.
+    """
+    file = _read(_text_of(Path(path)), str(path))
+    tasks, problems = _resolved([file], lambda: _known(tasks_path), {})
+    found = tuple(problem for _, problem in problems)
+    return FileCheck({} if found else tasks, found, file.warnings)
 
 
 def task_schema() -> dict[str, Any]:
@@ -83,11 +146,47 @@ def task_schema() -> dict[str, Any]:
 
 @cache
 def _library() -> Mapping[str, Task]:
-    tasks: dict[str, Task] = {}
-    for entry in files("bimnav.tasks").joinpath("library").iterdir():
-        if entry.name.endswith(".toml"):
-            tasks |= _tasks(entry.read_text(encoding="utf-8"), f"built-in {entry.name}")
+    entries = sorted(files("bimnav.tasks").joinpath("library").iterdir(), key=lambda entry: entry.name)
+    read = [
+        _read(entry.read_text(encoding="utf-8"), f"built-in {entry.name}", is_linted=True)
+        for entry in entries
+        if entry.name.endswith(".toml")
+    ]
+    return _sorted(_tasks(read, dict))
+
+
+def _known(tasks_path: Folders) -> Mapping[str, Task]:
+    """Return the built-in tasks and those of users' own folders."""
+    wanted = [Path(entry) for entry in tasks_path]
+    wanted += [Path(entry) for entry in os.environ.get(VARIABLE, "").split(os.pathsep) if entry]
+    paths = list(dict.fromkeys(path for entry in wanted for path in _files_at(entry)))
+    read = [_read(_text_of(path), str(path)) for path in paths]
+    return _sorted({**_library(), **_tasks(read, _library, _library())})
+
+
+def _files_at(entry: Path) -> list[Path]:
+    if entry.is_file():
+        return [entry]
+    if not entry.is_dir():
+        raise FileMissingError(
+            f"{entry} does not exist.", f"tasks_path and {VARIABLE} list folders of task files.", {"path": str(entry)}
+        )
+    return sorted(entry.glob("*.toml"))
+
+
+def _sorted(tasks: Mapping[str, Task]) -> Mapping[str, Task]:
     return MappingProxyType({name: tasks[name] for name in sorted(tasks)})
+
+
+def _named(task: str, name: str | None, known: Mapping[str, Task]) -> Task:
+    if name is not None or task not in known:
+        told = task if name is None else f"{task}:{name}"
+        raise TaskError(
+            f"there is no task {told!r}.",
+            f"{_nearest(task, known)} For a task of your own give the path of a .toml file.",
+            {"name": task, "known": list(known)},
+        )
+    return known[task]
 
 
 def _chosen(tasks: Mapping[str, Task], name: str | None, source: str) -> Task:
@@ -133,39 +232,147 @@ def _text_of(path: Path) -> str:
         raise TaskError(f"{path}:{line}: this is not UTF-8 text.", "Save the file as UTF-8.", context) from error
 
 
-def _tasks(text: str, source: str) -> dict[str, Task]:
-    """Read all tasks of a text, or raise with all its mistakes."""
+def _read(text: str, source: str, *, is_linted: bool = False) -> _File:
+    """Read the tables of a text, each by itself, with all that is wrong with them."""
     from bimnav.tasks._schema import check_tables
 
     toml = read_toml(text)
-    tables, problems = ({}, toml.problems) if toml.problems else check_tables(toml)
+    if toml.problems:
+        return _File(source, toml, {}, toml.problems)
+    tables, problems = check_tables(toml)
+    warnings: list[Problem] = []
+    if not is_linted:
+        from bimnav.tasks._lint import lint_filters
+
+        mistakes, warnings = lint_filters(toml)
+        problems += mistakes
+    return _File(source, toml, tables, tuple(problems), tuple(warnings))
+
+
+def _tasks(read: Iterable[_File], outside: Known, taken: Mapping[str, Task] = MappingProxyType({})) -> dict[str, Task]:
+    """Make the tasks of files, or raise with all the mistakes of all of them."""
+    read = list(read)
+    tasks, problems = _resolved(read, outside, taken)
     if problems:
-        raise _mistakes(source, problems)
-    return {name: _task(name, table, source, toml) for name, table in tables.items()}
+        raise _mistakes(problems)
+    for file in read:
+        for warning in file.warnings:
+            _LOG.warning("%s:%d: %s", file.source, warning.line, warning.message)
+    return tasks
 
 
-def _task(name: str, table: TaskTable, source: str, toml: Toml) -> Task:
+def _resolved(
+    read: Iterable[_File], outside: Known, taken: Mapping[str, Task]
+) -> tuple[dict[str, Task], list[tuple[str, Problem]]]:
+    """Build tasks on those that they extend; return them and what is wrong, by source.
+
+    Parameters
+    ----------
+    outside
+        Returns the tasks of other files.
+    taken
+        Tasks whose names are not free.
+    """
+    read = list(read)
+    problems = [(file.source, problem) for file in read for problem in file.problems]
+    places: dict[str, tuple[_File, str]] = {}
+    for file in read:
+        for name, base in _names_in(file):
+            first = taken[name].source if name in taken else _place(places[name][0], name) if name in places else ""
+            if first:
+                told = f"there is a task {name!r} already, at {first}; give this one another name."
+                problems.append((file.source, _problem_at(file, ("tasks", name), told, name)))
+            places.setdefault(name, (file, base))
+    resolver = _Resolver(places, outside)
+    for name in places:
+        resolver.task(name)
+    return resolver.tasks, problems + resolver.problems
+
+
+def _names_in(file: _File) -> Iterator[tuple[str, str]]:
+    """Yield each task of a file and what it extends, also where something else is wrong."""
+    tables = file.toml.document.get("tasks")
+    for name, table in tables.items() if isinstance(tables, dict) else ():
+        base = table.get("extends") if isinstance(table, dict) else None
+        yield name, base if isinstance(base, str) else ""
+
+
+class _Resolver:
+    """Builds tasks on other tasks: those of the same files, then those known by name."""
+
+    def __init__(self, places: Mapping[str, tuple[_File, str]], outside: Known) -> None:
+        self._places, self._outside = places, outside
+        self.tasks: dict[str, Task] = {}
+        self.problems: list[tuple[str, Problem]] = []
+        self._pending: list[str] = []
+        self._failed: set[str] = set()
+
+    def task(self, name: str) -> Task | None:
+        """Return a task of the files with all it is built on; None if something is wrong."""
+        if name in self.tasks or name in self._failed:
+            return self.tasks.get(name)
+        file, base = self._places[name]
+        self._pending.append(name)
+        below = self._base(file, name, base) if base else None
+        self._pending.pop()
+        if name not in file.tables or (base and below is None):
+            self._failed.add(name)
+            return None
+        self.tasks[name] = _task(name, file, below)
+        return self.tasks[name]
+
+    def _base(self, file: _File, name: str, base: str) -> Task | None:
+        key = ("tasks", name, "extends")
+        if base in self._pending and base != name:
+            circle = [*self._pending[self._pending.index(base) :], base]
+            self._refuse(file, key, base, f"goes round: {' extends '.join(map(repr, circle))}.")
+            return None
+        if base in self._places and base != name:
+            return self.task(base)
+        known = {other: task for other, task in self._outside().items() if task.source != _place(file, name)}
+        if base not in known:
+            self._refuse(file, key, base, f"there is no such task. {_nearest(base, [*self._places, *known])}")
+        return known.get(base)
+
+    def _refuse(self, file: _File, key: tuple[str, ...], value: str, what: str) -> None:
+        told = f"{'.'.join(key)} = {value!r}: {what}"
+        self.problems.append((file.source, _problem_at(file, key, told, repr(value))))
+
+
+def _place(file: _File, name: str) -> str:
+    return f"{file.source}:{file.toml.line_of(('tasks', name))}"
+
+
+def _problem_at(file: _File, key: tuple[str, ...], message: str, value: str) -> Problem:
+    return Problem(file.toml.line_of(key), message, ".".join(key), value)
+
+
+def _task(name: str, file: _File, base: Task | None) -> Task:
+    table = file.tables[name]
+
     def rules(kind: str) -> tuple[Rule, ...]:
         tables: list[RuleTable] = getattr(table, kind)
         return tuple(
-            Rule(**_values(rule, ()), source=f"{source}:{toml.line_of(('tasks', name, kind, k))}")
+            Rule(**_values(rule), source=f"{file.source}:{file.toml.line_of(('tasks', name, kind, k))}")
             for k, rule in enumerate(tables)
         )
 
-    values = _values(table, (*RULE_LISTS, "extends")) | {kind: rules(kind) for kind in RULE_LISTS}
-    return Task(name, **values, source=f"{source}:{toml.line_of(('tasks', name))}")
+    base = base or Task(name)
+    values = _values(table, said=True) | {kind: getattr(base, kind) + rules(kind) for kind in RULE_LISTS}
+    return replace(base, name=name, **values, source=_place(file, name))
 
 
-def _values(table: TaskTable | RuleTable, but: Iterable[str]) -> dict[str, Any]:
-    """Return what a table says, for the value it becomes."""
-    values = table.model_dump(exclude=set(but))
+def _values(table: TaskTable | RuleTable, *, said: bool = False) -> dict[str, Any]:
+    """Return what a table says, or what it and its defaults say, for the value it becomes."""
+    values = table.model_dump(exclude={*RULE_LISTS, "extends"}, exclude_unset=said)
     if isinstance(values.get("destination"), dict):
         values["destination"] = Standoff(**values["destination"])
     return values
 
 
-def _mistakes(source: str, problems: Iterable[Problem]) -> TaskError:
-    problems = sorted(problems, key=lambda problem: problem.line)
-    lines = [f"{source}:{problem.line}: {problem.message}" for problem in problems[:_MOST]]
+def _mistakes(problems: Iterable[tuple[str, Problem]]) -> TaskError:
+    problems = sorted(problems, key=lambda each: (each[0], each[1].line))
+    lines = [f"{source}:{problem.line}: {problem.message}" for source, problem in problems[:_MOST]]
     more = f"There are {len(problems) - _MOST} more mistakes." if len(problems) > _MOST else ""
-    return TaskError("\n".join(lines), more, {"file": source, "problems": [asdict(problem) for problem in problems]})
+    context = {"file": problems[0][0], "problems": [{"file": s, **asdict(problem)} for s, problem in problems]}
+    return TaskError("\n".join(lines), more, context)

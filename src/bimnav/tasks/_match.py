@@ -16,7 +16,7 @@ from bimnav.tasks._conditions import parse_condition
 from bimnav.tasks._task import Rule
 from bimnav.tasks._words import folded, haystack, needle
 
-__all__ = ["Match", "find", "match"]
+__all__ = ["Match", "find", "match", "told"]
 
 Product: TypeAlias = Element | Space
 Test: TypeAlias = Callable[[Product], "str | None"]  # None: fails; else why it holds, or nothing to say
@@ -46,7 +46,7 @@ def match(rule: Rule, building: Building) -> tuple[Match, ...]:
     found = find(rule, building)
     if not rule.is_met(len(found)):
         raise TaskError(
-            f"{_told(rule)} finds {len(found)} in {building.name!r} and expects {rule.expect}.",
+            f"{told(rule)} finds {len(found)} in {building.name!r} and expects {rule.expect}.",
             f"Its filter {rule.filter!r} alone picks {len(_filtered(rule, building))}.",
             {"rule": rule.label, "source": rule.source, "found": len(found), "expect": rule.expect},
         )
@@ -61,7 +61,7 @@ def find(rule: Rule, building: Building) -> tuple[Match, ...]:
         reasons = _reasons(product, tests)
         if reasons is not None:
             why = ", ".join(filter(None, reasons)) or f"{product.ifc_class} passes the filter {rule.filter!r}"
-            found.append(Match(product, f"{_told(rule)}: {why}"))
+            found.append(Match(product, f"{told(rule)}: {why}"))
     return tuple(found)
 
 
@@ -82,11 +82,15 @@ def _filtered(rule: Rule, building: Building) -> tuple[Product, ...]:
         try:
             known[rule.filter] = building.select(rule.filter)
         except SelectorError as error:
-            raise SelectorError(f"{_told(rule)}: {error.message}", error.hint, error.context) from error
+            if error.context.get("schema"):  # no product of this building can be of that class
+                known[rule.filter] = ()
+                return ()
+            raise SelectorError(f"{told(rule)}: {error.message}", error.hint, error.context) from error
     return known[rule.filter]
 
 
-def _told(rule: Rule) -> str:
+def told(rule: Rule) -> str:
+    """Return how messages call a rule."""
     label = f"rule {rule.label!r}" if rule.label else f"rule {rule.filter!r}"
     return f"{label} ({rule.source})" if rule.source else label
 
@@ -196,7 +200,7 @@ def _storey(name: str, rule: Rule, building: Building) -> str:
     try:
         return building.storeys[building.storey_index(name)].global_id
     except ModelError as error:
-        raise TaskError(f"{_told(rule)}: {error.message}", error.hint, error.context) from error
+        raise TaskError(f"{told(rule)}: {error.message}", error.hint, error.context) from error
 
 
 def _spaces(name: str, rule: Rule, building: Building) -> list[Space]:
@@ -209,7 +213,7 @@ def _spaces(name: str, rule: Rule, building: Building) -> list[Space]:
         near = difflib.get_close_matches(name, known, 3) or known[:5]
         listed = ", ".join(map(repr, near))
         hint = f"Among its {len(known)} spaces are {listed}." if near else "It has no spaces at all."
-        raise TaskError(f"{_told(rule)}: {building.name!r} has no space {name!r}.", hint, {"space": name})
+        raise TaskError(f"{told(rule)}: {building.name!r} has no space {name!r}.", hint, {"space": name})
     return spaces
 
 
