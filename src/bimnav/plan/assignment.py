@@ -21,8 +21,8 @@ Objective = Literal["total", "makespan"]
 
 _FEW = 12  # stops; more have too many shares to try them all
 _PROVED = 1e-9  # relative; a smaller gap is rounding
-_HALVINGS = 10  # of the range of the longest route
-_ITERATIONS = 1000  # of the search for one length of the longest route
+_HALVINGS = 8  # of the range of the longest route
+_ITERATIONS = 500  # of the search for one length of the longest route
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -114,7 +114,7 @@ def plan_charging(
                     continue
                 for other in range(chargers):
                     full = need + (there[other, stops] if stops > done or charger < 0 else math.inf) * metre
-                    if not (full <= usable and math.isfinite(back[other, stops])) or math.isnan(rate):
+                    if not (0 < full <= usable and math.isfinite(back[other, stops])) or math.isnan(rate):
                         continue
                     detour = there[other, stops] + back[other, stops] - way[stops]
                     total = best[place] + detour / robot.speed + full / rate

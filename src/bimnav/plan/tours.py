@@ -332,24 +332,27 @@ def _charged(
     chargers: tuple[Stop, ...],
 ) -> tuple[tuple[Stop, ...], tuple[Charge, ...], tuple[Stop, ...]]:
     """Return the stops with visits to chargers in between, what those cost, and the stops that cannot be done."""
-    cells = [start, *(stop.cell for stop in visits), *([] if goal is None or not visits else [goal])]
-    metres = distance_matrix(graph, [*cells, *(charger.cell for charger in chargers)])
-    n = len(cells)
-    service = [seconds_at(graph, stop) for stop in visits] + [0.0] * (n - 1 - len(visits))
-    back = np.roll(metres[n:, :n], -1, axis=1)  # column k leads to stop k
-    found = plan_charging(robot, np.diagonal(metres, 1)[: n - 1], service, metres[:n, n:].T, back)
+    for count in range(len(visits), -1, -1):  # the most stops after which it still gets where it should end
+        cells = [start, *(stop.cell for stop in visits[:count]), *([] if goal is None else [goal])]
+        n = len(cells)
+        metres = distance_matrix(graph, [*cells, *(charger.cell for charger in chargers)])
+        service = [seconds_at(graph, stop) for stop in visits[:count]] + [0.0] * (n - 1 - count)
+        back = np.roll(metres[n:, :n], -1, axis=1)  # column k leads to stop k
+        found = plan_charging(robot, np.diagonal(metres, 1)[: n - 1], service, metres[:n, n:].T, back)
+        if found.done == n - 1:
+            break
     along: list[Stop] = []
     charges = []
     planned = dict(zip(found.visits, found.charges, strict=True))
-    for done in range(min(found.done, len(visits)) + 1):
+    for done in range(count + 1):
         for (after, which), (detour, energy, seconds) in planned.items():
             if after == done:
                 charger = chargers[which]
                 charges.append(Charge(charger.global_id, charger.name, len(along), detour, energy, seconds))
                 along.append(replace(charger, service_time=seconds))
-        if done < min(found.done, len(visits)):
+        if done < count:
             along.append(visits[done])
-    return tuple(along), tuple(charges), visits[found.done :]
+    return tuple(along), tuple(charges), visits[count:]
 
 
 def why_unreached(graph: NavGraph, start: Cell, cell: Cell) -> str:
