@@ -489,7 +489,7 @@ def masked(rows: list[str], *legs: np.ndarray, size: float = 1.0, first: tuple[i
         elevations=(0.0,),
     )
     tour = tour_of(None, *legs)
-    tour.graph = SimpleNamespace(environment=None, frame=frame, free=free)
+    tour.graph = SimpleNamespace(environment=None, frame=frame, free=free, connectors=())
     return tour
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import shapely
@@ -36,6 +36,9 @@ _TROD = ("IfcStairFlight", "IfcRampFlight", "IfcSlab")
 _NOT_TROD = ("IfcRailing", "IfcMember", "IfcPlate", "IfcBeam", "IfcColumn")
 
 
+Point: TypeAlias = tuple[float, float, float]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Ascent:
     """What geometry tells of a connector. Lengths are metres; None is unknown, or has no meaning for its kind.
@@ -58,6 +61,12 @@ class Ascent:
         Rise divided by run; of a ramp, that of its steepest flight.
     steps, riser
         Number and height of the risers of a stair.
+    way : tuple of (x, y, z)
+        The way over it in world coordinates, from the lowest level to the highest: over the middles of its
+        treads, along the middle of its slopes; of a lift, the middle of its car at each level. Empty if
+        geometry shows none.
+    doors
+        GlobalIds of the doors of a lift.
     """
 
     global_id: str
@@ -65,7 +74,7 @@ class Ascent:
     kind: Literal["stair", "ramp", "lift"]
     levels: tuple[float, ...]
     storeys: tuple[int, ...]
-    entries: tuple[tuple[float, float, float], ...]
+    entries: tuple[Point, ...]
     rise: float
     run: float | None = None
     length: float | None = None
@@ -73,6 +82,13 @@ class Ascent:
     slope: float | None = None
     steps: int | None = None
     riser: float | None = None
+    way: tuple[Point, ...] = ()
+    doors: tuple[str, ...] = ()
+
+    def line(self, first: int = 0, last: int = -1) -> NDArray[np.float64]:
+        """Return the way over it, (n, 3), with where one gets on and off; of a lift, between two of its levels."""
+        inner = [self.way[first], self.way[last]] if self.kind == "lift" else self.way
+        return np.array([self.entries[first], *inner, self.entries[last]])
 
 
 def describe_connectors(building: Building) -> tuple[Ascent, ...]:
@@ -143,14 +159,17 @@ class _Survey:
     def _lift(self, connector: Connector, shapes: Sequence[Shape]) -> Ascent | None:
         plan = unite(outline([shape]) for shape in shapes)
         stops: dict[float, tuple[NDArray[np.float64], float]] = {}
-        for way in self._ways_near(plan):
+        doors = []
+        for global_id, way in self._ways_near(plan):
             if connector.low - NEAR <= way.bottom <= connector.high - _HEADROOM:
                 away = way.across * (1 if (way.center - plan.centroid.coords[0]) @ way.across > 0 else -1)
                 level = self._floor_near(way.bottom - NEAR, way.bottom + NEAR, way.bottom)
                 stops[level] = way.center + (way.depth / 2 + _BEFORE) * away, way.width
+                doors.append(global_id)
         if not stops:
             return None
         levels = sorted(stops)
+        x, y = shapely.get_coordinates(plan.centroid)[0].tolist()
         return Ascent(
             connector.global_id,
             connector.name,
@@ -160,15 +179,17 @@ class _Survey:
             tuple((*stops[level][0].tolist(), level) for level in levels),
             levels[-1] - levels[0],
             width=min(width for _, width in stops.values()),
+            way=tuple((x, y, level) for level in levels),
+            doors=tuple(doors),
         )
 
-    def _ways_near(self, plan: BaseGeometry) -> Iterable[Doorway]:
-        """Yield the doors of a lift, also those that are written as equipment."""
+    def _ways_near(self, plan: BaseGeometry) -> Iterable[tuple[str, Doorway]]:
+        """Yield the doors of a lift, also those that are written as equipment, each with its GlobalId."""
         doors = {door.global_id for door in self.building.doors}
         called = [e for e in self.building.elements if e.global_id not in doors and _DOOR.search(e.name)]
-        ways = [way for _, way in self.ground.doors]
-        ways += [way for element in called if (way := doorway_of(Door(element))) is not None]
-        yield from (way for way in ways if 0 < plan.distance(shapely.Point(way.center)) <= _LIFT_DOOR)
+        ways = [(door.global_id, way) for door, way in self.ground.doors]
+        ways += [(element.global_id, way) for element in called if (way := doorway_of(Door(element))) is not None]
+        yield from (w for w in ways if 0 < plan.distance(shapely.Point(w[1].center)) <= _LIFT_DOOR)
 
     def _boxed(self, connector: Connector, shapes: Sequence[Shape]) -> Ascent:
         """Describe a connector by its ends: it joins the floors nearest to them, in the middle of its plan."""
@@ -201,6 +222,8 @@ class _Survey:
         low, high = way[[0, -1], 2].tolist()
         legs = np.diff(way, axis=0)
         run = float(np.hypot(*legs[:, :2].T).sum())
+        points = tuple((x, y, z) for x, y, z in way.tolist())
+        found: dict[str, Any] = {"slope": (high - low) / run if run > 0 else None, "way": points}
         return Ascent(
             connector.global_id,
             connector.name,
@@ -211,7 +234,7 @@ class _Survey:
             high - low,
             run=run,
             length=float(np.linalg.norm(legs, axis=1).sum()),
-            **({"slope": (high - low) / run if run > 0 else None} | known),
+            **(found | known),
         )
 
 

@@ -122,14 +122,14 @@ class Gates:
         return tried[0] if tried else self._off_levels(door, way)
 
     def parts_beside(self, door: Door) -> tuple[set[int], set[int]]:
-        """Return the parts of the graph, as numbered in its components, in front of either side of a door."""
+        """Return the parts of the graph, as numbered in its parts, in front of either side of a door."""
         way = doorway_of(door, self.environment.building)
         parts: tuple[set[int], set[int]] = (set(), set())
         if way is None or self.graph is None:
             return parts
         for storey in self._storeys_near(way):
             u, v, window = self._cells_around(storey, way)
-            labels = np.where(np.abs(u) <= way.width / 2 + self.robot.radius, self.graph.components[window], 0)
+            labels = np.where(np.abs(u) <= way.width / 2 + self.robot.radius, self.graph.parts[window], 0)
             for part, side in zip(parts, (-1, 1), strict=True):
                 if self._has_floor(storey, way, side):
                     part |= set(labels[side * v > way.depth / 2].tolist()) - {0}

@@ -117,7 +117,7 @@ class Reach:
         self.environment = gates.environment
         margin = math.ceil(self.environment.robot.radius / graph.frame.cell_size) + 1
         self.frame = _widened(graph.frame, margin)
-        self.parts = np.pad(graph.components, ((0, 0), (margin, margin), (margin, margin)))
+        self.parts = np.pad(graph.parts, ((0, 0), (margin, margin), (margin, margin)))
         self._floor = np.pad(graph.floor, ((0, 0), (margin, margin), (margin, margin)))
         self.sizes = np.bincount(self.parts.ravel())
         self.sizes[0] = 0

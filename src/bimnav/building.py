@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from bimnav.errors import GeometryError, ModelError, ValueRangeError
 
 if TYPE_CHECKING:
+    from bimnav._connectors import Ascent
     from bimnav._georeference import Georeference
     from bimnav.assets import Asset
     from bimnav.readiness import Readiness
@@ -594,6 +595,13 @@ class Building:
         from bimnav.assets import read_asset
 
         return read_asset(self, global_id)
+
+    @cached_property
+    def ascents(self) -> tuple[Ascent, ...]:
+        """Every connector described: the levels it joins, how steep and wide it is, and the way over it."""
+        from bimnav._connectors import describe_connectors
+
+        return describe_connectors(self)
 
     def readiness(self, robot: Robot | None = None, *, cell_size: float = 0.05) -> Readiness:
         """Say which rooms, doors and floor a robot reaches, and why not the rest; see `readiness`."""

@@ -10,14 +10,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, get_args
 
 import numpy as np
-import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from bimnav.errors import GridError, NothingWalkableError, OutsideMapError, ValueRangeError
-from bimnav.grid import EROSION, Cell, GridFrame, cells_within, rasterize
+from bimnav import search
+from bimnav._cut import FINEST, Conflict, cut
+from bimnav._explicit import Edges, networkx_of, rustworkx_of
+from bimnav.errors import GridError, ValueRangeError
+from bimnav.grid import Cell, GridFrame
+from bimnav.links import Link, RefusedConnector, join_connectors
+from bimnav.robot import Robot
 from bimnav.stops import Stop, Unreached, standing_at, stop_at, why_not_served
 
 if TYPE_CHECKING:
@@ -26,9 +30,9 @@ if TYPE_CHECKING:
 
     from bimnav.environment import IndoorEnvironment, Target
 
-__all__ = ["Conflict", "NavGraph", "NodeKind", "Stop", "Unreached", "build_graph"]
+__all__ = ["Conflict", "NavGraph", "NodeKind", "Objective", "Stop", "Unreached", "build_graph"]
 
-_FINEST = 0.01  # metres; `refine` goes no further
+Objective: TypeAlias = Literal["distance", "time", "energy"]
 
 
 class NodeKind(IntEnum):
@@ -38,25 +42,6 @@ class NodeKind(IntEnum):
     OBSTACLE = 1
     TARGET = 2
     OUTSIDE = 3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Conflict:
-    """A target whose cell is also an obstacle cell.
-
-    Parameters
-    ----------
-    obstacles
-        GlobalIds of the elements that touch the cell.
-    curable
-        Whether smaller cells would resolve it: the destination itself is clear of obstacles.
-    """
-
-    global_id: str
-    name: str
-    cell: Cell
-    obstacles: tuple[str, ...]
-    curable: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +68,13 @@ class NavGraph:
         Targets whose cell is also an obstacle cell.
     on_conflict
         What becomes of them: `approach` the nearest safe standing cell, or `reach` the cell itself.
+    connectors
+        Ways between storeys: over stairs and ramps, and in lifts. One whose cell is blocked is closed.
+    refused_connectors
+        Stairs, ramps and lifts that the robot does not use, and why.
+    objective
+        What a path makes least: `distance` in metres, `time` in seconds, or `energy` in joules; times the
+        cells' multipliers.
     """
 
     frame: GridFrame
@@ -94,21 +86,41 @@ class NavGraph:
     targets: tuple[tuple[Target, Cell], ...] = ()
     conflicts: tuple[Conflict, ...] = ()
     on_conflict: Literal["approach", "reach"] = "approach"
+    connectors: tuple[Link, ...] = ()
+    refused_connectors: tuple[RefusedConnector, ...] = ()
+    objective: Objective = "distance"
 
     def __post_init__(self) -> None:
         if self.connectivity not in (4, 8):
             raise ValueRangeError(f"connectivity is {self.connectivity}.", "Give 4 or 8.")
         for name, dtype in (("cost", np.float32), ("obstacle", np.bool_), ("floor", np.bool_)):
-            array = np.array(getattr(self, name), dtype=dtype)
+            array = _owned(getattr(self, name), dtype)
             if array.shape != self.frame.shape:
                 raise GridError(f"{name} is {array.shape}, the frame is {self.frame.shape}.")
-            array.flags.writeable = False
             object.__setattr__(self, name, array)
         if np.isnan(self.cost).any() or (self.cost < 1).any():
             raise ValueRangeError("a cost is below 1 or not a number.", "Give multipliers of at least 1, or inf.")
+        object.__setattr__(self, "connectors", tuple(self.connectors))
+        for link in self.connectors:
+            if link.begin not in self.frame or link.end not in self.frame:
+                raise GridError(f"{link} leaves a frame of shape {self.frame.shape}.")
+        if self.objective not in get_args(Objective):
+            raise ValueRangeError(f"objective is {self.objective!r}.", "Give 'distance', 'time' or 'energy'.")
+        if self.objective == "energy" and not self._robot.drive_power:
+            raise ValueRangeError(
+                f"robot {self._robot.name!r} draws no power to drive, so no path saves energy.",
+                "Give the robot its drive_power in watts.",
+            )
 
     @classmethod
-    def from_mask(cls, free: ArrayLike, *, cell_size: float = 1.0, connectivity: Literal[4, 8] = 8) -> NavGraph:
+    def from_mask(
+        cls,
+        free: ArrayLike,
+        *,
+        cell_size: float = 1.0,
+        connectivity: Literal[4, 8] = 8,
+        connectors: Iterable[Link] = (),
+    ) -> NavGraph:
         """Make a graph from a mask of free cells, without a building.
 
         Parameters
@@ -119,6 +131,8 @@ class NavGraph:
             Edge of a cell in metres.
         connectivity
             4 or 8.
+        connectors
+            Ways between storeys.
         """
         mask = np.asarray(free, dtype=np.bool_)
         if mask.ndim == 2:
@@ -128,7 +142,7 @@ class NavGraph:
         heights = tuple(3.0 * storey for storey in range(mask.shape[0]))
         frame = GridFrame(cell_size, 0, 0, mask.shape[1], mask.shape[2], heights)
         cost = np.where(mask, np.float32(1), np.float32(np.inf))
-        return cls(frame, cost, ~mask, np.ones_like(mask), connectivity)
+        return cls(frame, cost, ~mask, np.ones_like(mask), connectivity, connectors=tuple(connectors))
 
     def __repr__(self) -> str:
         storeys, rows, cols = self.frame.shape
@@ -165,13 +179,56 @@ class NavGraph:
 
         Diagonal steps never cut corners, so they join nothing that straight steps do not join.
         """
-        from scipy import ndimage
+        return _frozen(search.components(self.free, self.links[0]))
 
-        cross = np.zeros((3, 3, 3), dtype=np.bool_)
-        cross[1, 1, :] = cross[1, :, 1] = True
-        labels: NDArray[np.int32] = ndimage.label(self.free, structure=cross)[0].astype(np.int32)
-        labels.flags.writeable = False
-        return labels
+    @cached_property
+    def parts(self) -> NDArray[np.int32]:
+        """(storeys, rows, cols) int32: as `components`, but for ways that lead over other storeys."""
+        return _frozen(search.components(self.free)) if len(self.links[0]) else self.components
+
+    @property
+    def unit_cost(self) -> float:
+        """What a metre of floor without a multiplier costs: metres, seconds or joules, by the objective."""
+        if self.objective == "distance":
+            return 1.0
+        return (1.0 if self.objective == "time" else self._robot.drive_power) / self._robot.speed
+
+    def cost_of(self, link: Link) -> float:
+        """Return what a link costs: metres, seconds or joules, by the objective, times its multiplier."""
+        seconds = link.length / self._robot.speed if link.seconds is None else link.seconds
+        if self.objective == "distance":
+            return link.length * link.factor
+        if self.objective == "time":
+            return seconds * link.factor
+        power = self._robot.idle_power if link.kind == "lift" else self._robot.drive_power
+        return seconds * power * link.factor
+
+    @cached_property
+    def links(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The open connectors as edges: (k, 2) flat indexes of from and to, both ways, and (k,) costs."""
+        ends = np.array([(*link.begin, *link.end) for link in self.connectors], dtype=np.int64).reshape(-1, 2, 3)
+        _, rows, cols = self.frame.shape
+        flat = (ends[..., 0] * rows + ends[..., 1]) * cols + ends[..., 2]
+        cost = np.array([self.cost_of(link) for link in self.connectors], dtype=np.float64)
+        is_open = self.free.ravel()[flat].all(axis=1)
+        flat, cost = flat[is_open], cost[is_open]
+        return _frozen(np.concatenate([flat, flat[:, ::-1]])), _frozen(np.tile(cost, 2))
+
+    def link_between(self, begin: Cell, end: Cell) -> Link | None:
+        """Return the cheapest connector that joins two cells; None if none does."""
+        return self._links_by_ends.get((*begin, *end))
+
+    @cached_property
+    def _links_by_ends(self) -> dict[tuple[int, ...], Link]:
+        found: dict[tuple[int, ...], Link] = {}
+        for link in sorted(self.connectors, key=self.cost_of):
+            found.setdefault((*link.begin, *link.end), link)
+            found.setdefault((*link.end, *link.begin), link)
+        return found
+
+    @property
+    def _robot(self) -> Robot:
+        return Robot() if self.environment is None else self.environment.robot
 
     @cached_property
     def stops(self) -> tuple[Stop, ...]:
@@ -224,15 +281,20 @@ class NavGraph:
         cost = np.broadcast_to(np.asarray(factor, dtype=np.float32), self.frame.shape)
         return replace(self, cost=np.where(self.free, cost, np.float32(np.inf)))
 
-    def edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-        """Return all edges once: flat indexes of their two cells, and their cost in metres.
+    def with_objective(self, objective: Objective) -> Self:
+        """Return the graph whose paths make something else least."""
+        return self if objective == self.objective else replace(self, objective=objective)
 
-        A flat index counts cells in the order of the arrays. The cost of a step is its length times
-        the mean of the two cells' multipliers.
+    def edges(self) -> Edges:
+        """Return all edges once: flat indexes of their two cells, and their cost.
+
+        A flat index counts cells in the order of the arrays. The cost of a step is its length times the
+        mean of the two cells' multipliers, in metres; under another objective in seconds or joules. Open
+        connectors come last; of several between two cells, the cheapest.
         """
         index = np.arange(self.cost.size).reshape(self.frame.shape)
         free, cost = self.free, self.cost.astype(np.float64)
-        ends: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]] = []
+        ends: list[Edges] = []
 
         def join(
             a: tuple[slice, ...], b: tuple[slice, ...], length: float, open_: NDArray[np.bool_] | np.bool_
@@ -240,7 +302,7 @@ class NavGraph:
             keep = free[a] & free[b] & open_
             ends.append((index[a][keep], index[b][keep], length * (cost[a][keep] + cost[b][keep]) / 2))
 
-        d, all_, low, high = self.frame.cell_size, slice(None), slice(None, -1), slice(1, None)
+        d, all_, low, high = self.frame.cell_size * self.unit_cost, slice(None), slice(None, -1), slice(1, None)
         every = np.True_
         join((all_, all_, low), (all_, all_, high), d, every)
         join((all_, low, all_), (all_, high, all_), d, every)
@@ -249,6 +311,11 @@ class NavGraph:
             join((all_, low, low), (all_, high, high), d * math.sqrt(2), corner_a & corner_b)
             corner_a, corner_b = free[:, low, low], free[:, high, high]
             join((all_, low, high), (all_, high, low), d * math.sqrt(2), corner_a & corner_b)
+        flat, link_cost = self.links
+        flat = np.sort(flat[: len(flat) // 2], axis=1)
+        order = np.lexsort((link_cost[: len(flat)], flat[:, 1], flat[:, 0]))
+        flat, first = np.unique(flat[order], axis=0, return_index=True)
+        ends.append((flat[:, 0], flat[:, 1], link_cost[order[first]]))
         a, b, weight = (np.concatenate(part) for part in zip(*ends, strict=True))
         return a, b, weight
 
@@ -259,19 +326,9 @@ class NavGraph:
         -------
         graph
             Undirected; node k is the cell with flat index k, also if it has no edges; the weight of
-            an edge is its cost in metres. Blocked cells have no edges.
+            an edge is its cost, as in `edges`. Blocked cells have no edges.
         """
-        return self._explicit.copy()
-
-    @cached_property
-    def _explicit(self) -> rustworkx.PyGraph[int, float]:
-        import rustworkx
-
-        a, b, weight = self.edges()
-        graph: rustworkx.PyGraph[int, float] = rustworkx.PyGraph(multigraph=False)
-        graph.add_nodes_from(range(self.cost.size))
-        graph.add_edges_from(list(zip(a.tolist(), b.tolist(), weight.tolist(), strict=True)))
-        return graph
+        return rustworkx_of(self.cost.size, self.edges())
 
     def to_networkx(self) -> networkx.Graph[Cell]:
         """Write the graph out for networkx.
@@ -279,26 +336,27 @@ class NavGraph:
         Returns
         -------
         graph
-            Nodes are cells with `kind` and `pos` (metres); the `weight` of an edge is its cost in metres.
+            Nodes are cells with `kind` and `pos` (metres); the `weight` of an edge is its cost, as in `edges`.
         """
-        try:
-            import networkx
-        except ImportError as error:
-            from bimnav.errors import MissingExtraError
-
-            hint = "pip install 'bimnav[networkx]'"
-            raise MissingExtraError("to_networkx needs networkx.", hint) from error
-        graph: networkx.Graph[Cell] = networkx.Graph()
         cells = [Cell(*cell) for cell in np.ndindex(*self.frame.shape)]
-        kinds = self.kinds.ravel()
-        centers = self.frame.centers_of(np.array(cells))
-        for cell, kind, center in zip(cells, kinds.tolist(), centers.tolist(), strict=True):
-            graph.add_node(cell, kind=NodeKind(kind).name.lower(), pos=tuple(center))
-        a, b, weight = self.edges()
-        graph.add_weighted_edges_from(
-            (cells[i], cells[j], w) for i, j, w in zip(a.tolist(), b.tolist(), weight.tolist(), strict=True)
+        kinds, centers = self.kinds.ravel().tolist(), self.frame.centers_of(np.array(cells)).tolist()
+        nodes = (
+            (cell, {"kind": NodeKind(kind).name.lower(), "pos": tuple(center)})
+            for cell, kind, center in zip(cells, kinds, centers, strict=True)
         )
-        return graph
+        return networkx_of(nodes, self.edges())
+
+
+def _frozen(array: NDArray[Any]) -> NDArray[Any]:
+    array.flags.writeable = False
+    return array
+
+
+def _owned(array: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
+    """Return a private, read-only copy of an array; of one that is its own and read-only, itself."""
+    if isinstance(array, np.ndarray) and array.dtype == dtype and array.flags.owndata and not array.flags.writeable:
+        return array
+    return _frozen(np.array(array, dtype=dtype))
 
 
 def build_graph(
@@ -308,8 +366,9 @@ def build_graph(
     connectivity: Literal[4, 8] = 4,
     refine: Literal["auto"] | None = None,
     on_conflict: Literal["approach", "reach"] = "approach",
+    objective: Objective = "distance",
 ) -> NavGraph:
-    """Cut an environment into cells.
+    """Cut an environment into cells, and join its storeys by the connectors its robot can use.
 
     Parameters
     ----------
@@ -324,6 +383,8 @@ def build_graph(
     on_conflict
         `approach`: such a target is served from the nearest safe standing cell. `reach`: its cell is
         kept reachable, as in the paper.
+    objective
+        What paths make least: `distance`, `time` or `energy`.
 
     Raises
     ------
@@ -336,74 +397,14 @@ def build_graph(
         raise ValueRangeError(f"refine is {refine!r}.", "Give 'auto' or None.")
     if on_conflict not in ("approach", "reach"):
         raise ValueRangeError(f"on_conflict is {on_conflict!r}.", "Give 'approach' or 'reach'.")
-    graph = _build(environment, cell_size, connectivity, on_conflict)
-    while refine and any(c.curable for c in graph.conflicts) and graph.frame.cell_size / 2 >= _FINEST:
-        graph = _build(environment, graph.frame.cell_size / 2, connectivity, on_conflict)
-    return graph
-
-
-def _build(
-    environment: IndoorEnvironment,
-    cell_size: float,
-    connectivity: Literal[4, 8],
-    on_conflict: Literal["approach", "reach"],
-) -> NavGraph:
-    floors = [environment.floor(storey) for storey in range(len(environment.levels))]
-    bounds = np.array([floor.bounds for floor in floors if not floor.is_empty])
-    if not len(bounds):
-        raise NothingWalkableError(
-            f"{environment.building.name!r} has no floor that robot {environment.robot.name!r} could stand on.",
-            "Use a smaller robot." if environment.regions else "No space, slab or wall of it has a shape.",
-        )
-    frame = GridFrame.covering(
-        (*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0)),
-        cell_size,
-        elevations=environment.levels,
-        ground=environment.ground,
-    )
-    obstacle = np.zeros(frame.shape, dtype=np.bool_)
-    walkable = np.zeros(frame.shape, dtype=np.bool_)
-    cost = np.ones(frame.shape, dtype=np.float32)
-    for storey, floor in enumerate(floors):
-        if floor.is_empty:
-            continue
-        walkable[storey] = cells_within(frame, floor)
-        obstacle[storey] = rasterize(frame, [body for _, body in environment.bodies_on(storey)])
-        for zone in environment.zones:
-            if zone.storey == storey:
-                touched = rasterize(frame, zone.polygon)
-                cost[storey][touched] = np.maximum(cost[storey][touched], np.float32(zone.factor))
-    cost[obstacle | ~walkable] = np.inf
-    targets = tuple(_targets_in(frame, environment))
-    conflicts = tuple(_conflict(frame, environment, target, cell) for target, cell in targets if obstacle[cell])
-    if on_conflict == "reach":
-        for conflict in conflicts:
-            cost[conflict.cell] = 1
-    return NavGraph(frame, cost, obstacle, walkable, connectivity, environment, targets, conflicts, on_conflict)
-
-
-def _targets_in(frame: GridFrame, environment: IndoorEnvironment) -> Iterable[tuple[Target, Cell]]:
-    for target in environment.targets:
-        x, y, _ = target.destination
-        try:
-            yield target, frame.cell_at(x, y, storey=target.storey)
-        except OutsideMapError as error:
-            raise OutsideMapError(
-                f"target {target.name!r} ({target.global_id}) at ({x:.3f}, {y:.3f}) lies outside the map.",
-                error.hint,
-                {"global_id": target.global_id, "name": target.name, "x": x, "y": y},
-            ) from error
-
-
-def _conflict(frame: GridFrame, environment: IndoorEnvironment, target: Target, cell: Cell) -> Conflict:
-    x0, y0, x1, y1 = frame.box_of(cell)
-    box = shapely.box(x0 + EROSION, y0 + EROSION, x1 - EROSION, y1 - EROSION)
-    touching = [(o, body) for o, body in environment.bodies_on(cell.storey) if body.intersects(box)]
-    point = shapely.Point(target.destination[:2])
-    return Conflict(
-        target.global_id,
-        target.name,
-        cell,
-        tuple(dict.fromkeys(obstacle.global_id for obstacle, _ in touching)),
-        curable=all(body.distance(point) > _FINEST for _, body in touching),
-    )
+    cells = cut(environment, cell_size, on_conflict)
+    while refine and any(c.curable for c in cells.conflicts) and cells.frame.cell_size / 2 >= FINEST:
+        cells = cut(environment, cells.frame.cell_size / 2, on_conflict)
+    frame, cost, obstacle, floor, targets, conflicts = cells
+    for array in (cost, obstacle, floor):
+        _frozen(array)
+    connectors, refused = join_connectors(environment, frame, np.isfinite(cost))
+    return NavGraph(
+        frame, cost, obstacle, floor, connectivity, environment, targets, conflicts, on_conflict, connectors, refused,
+        objective,
+    )  # fmt: skip

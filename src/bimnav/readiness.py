@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bimnav._connectors import Ascent, describe_connectors
+from bimnav._connectors import Ascent
 from bimnav._findings import findings
 from bimnav._gates import DoorCheck, Gates, doors_of
 from bimnav._reach import Reach
@@ -178,7 +178,7 @@ def readiness(building: Building, robot: Robot | None = None, *, cell_size: floa
     """
     robot = robot or Robot(radius=0.25)
     environment = make_environment(building, Task("readiness", "where a robot can go"), robot)
-    connectors = describe_connectors(building)
+    connectors = building.ascents
     reach, doors = _tried(environment, cell_size, connectors)
     rooms = tuple(_rooms(environment, reach))
     return Readiness(

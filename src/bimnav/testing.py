@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bimnav.building import Building, Door, Element, Mesh, Opening, Shape, Space, Storey
+from bimnav.building import Building, Connector, Door, Element, Mesh, Opening, Shape, Space, Storey
 from bimnav.errors import GeometryError, GridError
+from bimnav.grid import Cell
 
 if TYPE_CHECKING:
     from bimnav.plan import Path
 
-__all__ = ["assert_valid_path", "box", "grid_from_text", "prism", "prism_shape", "room", "two_rooms"]
+__all__ = ["assert_valid_path", "box", "grid_from_text", "prism", "prism_shape", "room", "two_rooms", "two_storeys"]
 
 _PROXY = "IfcBuildingElementProxy"
 
@@ -191,6 +192,72 @@ def two_rooms(
     )
 
 
+def two_storeys(
+    kind: Literal["stair", "ramp", "lift"] = "stair",
+    *,
+    rise: float = 3.0,
+    width: float = 1.2,
+    run: float = 3.5,
+    elements: Iterable[Element] = (),
+) -> Building:
+    """Build two rooms, one above the other, joined by a stair, a ramp or a lift.
+
+    The spaces `space-lower` and `space-upper` are as large: 4 m deep, and 3 m longer at both ends than the
+    connector, which stands along the wall at y = 0 and begins at x = 3. A lift has its doors at x = 5.
+
+    Parameters
+    ----------
+    kind
+        What joins them: `stair` of 15 risers, `ramp` or `lift`.
+    rise
+        From floor to floor, metres.
+    width, run
+        Of the stair or ramp in plan view, metres.
+    elements
+        What stands in the rooms.
+    """
+    if kind == "lift":
+        width, run = 2.0, 2.0
+    plan = shapely.box(3, 0, 3 + run, width)
+    length, depth = 6 + run, 4.0
+    floor = shapely.box(0, 0, length, depth)
+    doors: tuple[Door, ...] = ()
+    if kind == "stair":
+        treads = np.arange(14) * run / 14 + 3
+        shapes = tuple(
+            prism_shape(shapely.box(x, 0, x + run / 14, width), 0.0, (k + 1) * rise / 15)
+            for k, x in enumerate(treads.tolist())
+        )
+        way = Element("way", "IfcStairFlight", "Stair", shapes=shapes)
+    elif kind == "ramp":
+        corners = [(x, y, z) for y in (0.0, width) for x, z in ((3.0, 0.0), (3.0 + run, 0.0), (3.0 + run, rise))]
+        faces = [(0, 1, 2), (3, 5, 4), (0, 3, 4), (0, 4, 1), (1, 4, 5), (1, 5, 2), (0, 2, 5), (0, 5, 3)]
+        way = Element("way", "IfcRampFlight", "Ramp", shapes=(Shape(Mesh(np.array(corners), np.array(faces))),))
+    else:
+        way = box("way", 3, 0, -0.2, 5, 2, 2 * rise, ifc_class="IfcTransportElement", name="Lift")
+        doors = tuple(
+            Door(box(f"door-{name}", 5.0, 0.5, z, 5.1, 1.5, z + 2.1, ifc_class="IfcDoor", name="Lift door"), width=1.0)
+            for name, z in (("lower", 0.0), ("upper", rise))
+        )
+    space = (
+        Space("space-lower", "Lower", storey="lower", shapes=(prism_shape(floor, 0.0, rise - 0.3),)),
+        Space("space-upper", "Upper", storey="upper", shapes=(prism_shape(floor, rise, 2 * rise - 0.3),)),
+    )
+    slabs = (
+        prism("slab-lower", floor, -0.2, 0.0, ifc_class="IfcSlab"),
+        prism("slab-upper", floor.difference(plan), rise - 0.2, rise, ifc_class="IfcSlab"),
+    )
+    high = rise if kind != "stair" else rise * 14 / 15
+    return Building(
+        "two storeys",
+        (Storey("lower", "Lower floor", 0.0), Storey("upper", "Upper floor", rise)),
+        space,
+        (*_walls(length, depth, 2 * rise, 0.2), *slabs, way, *(door.element for door in doors), *elements),
+        doors,
+        connectors=(Connector("connector", way.name, kind, ("way",), 0.0, 2 * rise if kind == "lift" else high),),
+    )
+
+
 def _space(global_id: str, x0: float, x1: float, depth: float, height: float) -> Space:
     shape = prism_shape(shapely.box(x0, 0, x1, depth), 0.0, height)
     return Space(global_id, global_id, storey="storey", shapes=(shape,))
@@ -212,8 +279,8 @@ def _walls(width: float, depth: float, height: float, thickness: float) -> list[
 def assert_valid_path(path: Path) -> None:
     """Check a path against the cells of its graph, whoever planned it.
 
-    All cells are free, each is a neighbor of the one before, no diagonal step passes a blocked corner, and
-    the length is the sum of the steps.
+    All cells are free, each is a neighbor of the one before or joined to it by a connector, no diagonal step
+    passes a blocked corner, and the length is the sum of the steps and connectors.
 
     Raises
     ------
@@ -232,7 +299,13 @@ def assert_valid_path(path: Path) -> None:
             raise AssertionError(f"{cell} is blocked")
     for (storey, row, col), (storey_b, row_b, col_b) in pairwise(cells):
         rows, cols = abs(row_b - row), abs(col_b - col)
-        if storey != storey_b or max(rows, cols) != 1:
+        if storey != storey_b:
+            link = path.graph.link_between(Cell(storey, row, col), Cell(storey_b, row_b, col_b))
+            if link is None:
+                raise AssertionError(f"no connector leads from {(storey, row, col)} to {(storey_b, row_b, col_b)}")
+            length += link.length
+            continue
+        if max(rows, cols) != 1:
             raise AssertionError(f"{(storey_b, row_b, col_b)} is no neighbor of {(storey, row, col)}")
         if rows == cols:
             if path.graph.connectivity == 4:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import zip_longest
+from itertools import combinations, pairwise, zip_longest
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import fcl
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bimnav.building import Element
     from bimnav.environment import IndoorEnvironment
     from bimnav.graph import NavGraph
+    from bimnav.links import Link
     from bimnav.plan import Tour
 
 __all__ = ["Check", "Violation", "check_path", "check_plan"]
@@ -39,6 +40,7 @@ Kind = Literal[
     "wrong-end",
     "no-storey",
     "storey-jump",
+    "climb",
     "unknown-shape",
     "footprint",
     "body",
@@ -53,9 +55,11 @@ _SAME = 1e-6  # metres; points and heights closer than this are the same
 _FLOOR_GRID = 1e-6  # metres to which corners of the floor are rounded; floats hold it to 1e9 m
 _GAP = 0.12  # metres; gaps in the floor are driven over, and a body may overhang: more than any planner closes
 _SKIN = 1e-4  # metres; the body in space is thinner by this: the meshes of round things have chords for arcs
+_CLOSE = 0.03  # metres of height; a floor finish that a connector does not know of
 _NEAR = 1.0  # metres; how far around the body the clearance in space is measured
 _HALF_TURN = 16  # chords of half a round body; they lie inside the circle, so a touch is a true touch
 _FARTHEST = 1e8  # metres from the origin; beyond it float64 no longer resolves a slack
+_SLICE = 0.05  # metres of height in which the body on a stair is judged
 _CONTACTS = 100  # of one element; more would only name the same trouble again
 
 
@@ -68,7 +72,8 @@ class Violation:
     kind
         `footprint`: the robot reaches into an obstacle in plan view. `body`: its body meets a mesh.
         `inside`: its body lies wholly in a solid. `restricted`: its middle enters a zone where it must
-        never be. `off-floor`: it leaves the floor. All others: the path cannot be judged, or is torn.
+        never be. `off-floor`: it leaves the floor. `climb`: it takes a stair, ramp or lift that the robot
+        cannot use. All others: the path cannot be judged, or is torn.
     message
         What was found, where, and how deep.
     point : (x, y, z), metres
@@ -157,12 +162,15 @@ def check_path(
 
     In plan view the body must keep clear of every footprint: a round robot may touch, a point may not.
     Where elements have meshes, the body in space is judged against them as well, from the robot's step
-    height to its height; it is thinner by a tenth of a millimetre there.
+    height to its height; it is thinner by a tenth of a millimetre there. From storey to storey a path must
+    follow a connector of the building that the robot can use; on a stair or ramp the body is judged against
+    everything but the connector itself, above what the robot climbs over, and in a lift where it gets on
+    and off.
 
     Parameters
     ----------
     points : (n, 3) float64, world metres
-        A polyline. Its heights are levels of the environment; it cannot change the storey.
+        A polyline. Its heights are levels of the environment, and those of the ways over its connectors.
     environment
         Regions, obstacles, zones and the robot.
     body
@@ -261,6 +269,45 @@ class _World:
     elements: Sequence[Element] = ()
     bounds: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2, 3)))  # of every element
     unknown: Sequence[Violation] = ()
+    ways: Sequence[_Way] = ()
+    solids: Sequence[Element] = ()  # everything that is no door and no terrain, on whatever storey
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Way:
+    """A way from storey to storey."""
+
+    owner: _Owner
+    points: NDArray[np.float64]
+    is_lift: bool = False
+    own: Collection[str] = ()  # GlobalIds of what it is made of
+    step: float = 0.0  # metres between its ends and the floors there that the robot takes
+    foot: float = 0.0  # metres above it from which on the body is judged
+    unfit: str = ""
+
+
+def _ways(environment: IndoorEnvironment) -> Iterator[_Way]:
+    """Yield the ways over the connectors of a building, and whether the robot can use them."""
+    building, robot = environment.building, environment.robot
+    parts = {connector.global_id: connector.parts for connector in building.connectors}
+    for ascent in building.ascents:
+        if not ascent.way:
+            continue
+        is_lift, is_stair = ascent.kind == "lift", ascent.kind == "stair"
+        faults = {
+            "it does not ride in lifts": is_lift and not robot.uses_lifts,
+            "its risers are too high": is_stair and not (ascent.riser or math.inf) <= robot.max_riser,
+            "it is too steep": ascent.kind == "ramp" and not (ascent.slope or math.inf) <= robot.max_slope,
+            "it is too narrow": robot.radius > 0 and not (ascent.width or 0) >= 2 * robot.radius,
+        }
+        unfit = next((fault for fault, is_true in faults.items() if is_true), "")
+        step = (max(robot.step_height, robot.max_riser) if is_stair else robot.step_height) + _CLOSE
+        foot = robot.low + (0 if is_lift else (ascent.riser or 0.0) + (ascent.slope or 0.0) * robot.radius)
+        own = {ascent.global_id, *parts[ascent.global_id], *ascent.doors}
+        stops = range(len(ascent.levels))
+        for first, last in combinations(stops, 2) if is_lift else [(0, -1)]:
+            owner = ascent.global_id, ascent.name
+            yield _Way(owner, ascent.line(first, last), is_lift, own, step, min(foot, robot.height / 2), unfit)
 
 
 def _surroundings(environment: IndoorEnvironment, ignore: Collection[str]) -> _World:
@@ -289,7 +336,14 @@ def _surroundings(environment: IndoorEnvironment, ignore: Collection[str]) -> _W
         [element for element, _ in boxes],
         np.array([box for _, box in boxes]).reshape(-1, 2, 3),
         [_refusal("unknown-shape", f"the shape of {_who(x)} is empty or not finite", None, 0.0, x) for x in lost],
+        tuple(_ways(environment)),
+        _solids(environment, ignore),
     )
+
+
+def _solids(environment: IndoorEnvironment, ignore: Collection[str]) -> list[Element]:
+    ignored = {*ignore, *(global_id for global_id, _ in environment.left_out)}
+    return [e for e in environment.building.elements if e.global_id not in ignored and e.bounds is not None]
 
 
 def _first_at(levels: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -311,7 +365,15 @@ def _blocked_cells(graph: NavGraph) -> _World:
     whole = shapely.box(x, y, (frame.first_col + frame.cols) * size, (frame.first_row + frame.rows) * size)
     levels = np.asarray(frame.elevations, dtype=np.float64)
     floors = [(index, whole) for index in range(len(levels))]
-    return _World(levels, [("", "a blocked cell")] * len(boxes), boxes, _first_at(levels)[storey], floors)
+    ways = [_Way((link.global_id, link.name), _points_of(link, graph)) for link in graph.connectors]
+    names = [("", "a blocked cell")] * len(boxes)
+    return _World(levels, names, boxes, _first_at(levels)[storey], floors, ways=ways)
+
+
+def _points_of(link: Link, graph: NavGraph) -> NDArray[np.float64]:
+    if len(link.points):
+        return link.points
+    return np.array([graph.frame.center_of(link.begin), graph.frame.center_of(link.end)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -358,12 +420,16 @@ def _judge(legs: Sequence[_Leg], world: _World, body: bool, torn: Iterable[Viola
     found = [*torn, *world.unknown]
     parts: dict[int, list[_Leg]] = {}
     length, clearance, clearance_3d = 0.0, math.inf, math.inf
-    for leg, points in legs:
-        for storey, part in _parts(leg, points, world.levels, found):
-            parts.setdefault(storey, []).append((leg, part))
-            length += float(np.hypot(*np.diff(part, axis=0).T).sum())
     body = body and bool(world.elements)
     body_of = cache(_body)
+    for leg, points in legs:
+        flat, climbs = _climbs(points, world)
+        for way, climb in climbs:
+            length += float(np.linalg.norm(np.diff(climb, axis=0), axis=1).sum())
+            clearance_3d = min(clearance_3d, _check_climb(way, climb, leg, world, body_of if body else None, found))
+        for storey, part in (found_on for piece in flat for found_on in _parts(leg, piece, world.levels, found)):
+            parts.setdefault(storey, []).append((leg, part))
+            length += float(np.hypot(*np.diff(part, axis=0).T).sum())
     for storey in sorted(parts):
         track = _track(storey, float(world.levels[storey]), parts[storey])
         clearance = min(clearance, _check_footprints(track, world, found))
@@ -372,6 +438,99 @@ def _judge(legs: Sequence[_Leg], world: _World, body: bool, torn: Iterable[Viola
             clearance_3d = min(clearance_3d, _check_bodies(track, world, body_of, found))
     found.sort(key=lambda v: (v.kind in _CONTACT, -v.depth))
     return Check(tuple(found), clearance, clearance_3d if body else None, length)
+
+
+def _climbs(
+    points: NDArray[np.float64], world: _World
+) -> tuple[list[NDArray[np.float64]], list[tuple[_Way, NDArray[np.float64]]]]:
+    """Part a leg into stretches between connectors and climbs over them; what follows none stays in a stretch."""
+    flat, climbs, done = [], [], 0
+    for k in np.flatnonzero(np.abs(np.diff(points[:, 2])) > _SAME).tolist():
+        if k < done:
+            continue
+        for way in world.ways:
+            found = next(
+                filter(None, (_along(points, k, way, line, world) for line in (way.points, way.points[::-1]))), None
+            )
+            if found is not None:
+                first, last = found
+                flat.append(points[done : first + 1])
+                climbs.append((way, points[first : last + 1]))
+                done = last
+                break
+    return [*flat, points[done:]], climbs
+
+
+def _along(
+    points: NDArray[np.float64], k: int, way: _Way, line: NDArray[np.float64], world: _World
+) -> tuple[int, int] | None:
+    """Return the points, first and last, that follow a line of a connector around piece k of a leg.
+
+    They pass all of its points from one floor to another. Only its ends may lie a step beside these floors.
+    """
+    with np.errstate(invalid="ignore"):
+        same = np.all(np.abs(points[k : k + 2, None, :2] - line[:, :2]) <= _SAME, axis=2)
+        level = np.any(np.abs(points[:, 2:] - world.levels) <= _SAME, axis=1)
+    for j in np.flatnonzero(same[0, :-1] & same[1, 1:]).tolist():
+        first, last, shift = k, k + 1, j - k
+        while first > 0 and first + shift > 0 and _is_at(points[first - 1], line[first + shift - 1]):
+            first -= 1
+        while (
+            last + 1 < len(points) and last + shift + 1 < len(line) and _is_at(points[last + 1], line[last + shift + 1])
+        ):
+            last += 1
+        on = np.flatnonzero(level[first : last + 1]) + first
+        if not (len(on) and on[0] <= k < on[-1]):
+            continue
+        first, last = int(on[0]), int(on[-1])
+        climb, due = points[first : last + 1, 2], line[first + shift : last + shift + 1, 2].copy()
+        for end in (0, -1):
+            if abs(climb[end] - due[end]) <= way.step:
+                due[np.abs(due - due[end]) <= _SAME] = climb[end]
+        if (np.abs(climb - due) <= _SAME).all():
+            return first, last
+    return None
+
+
+def _is_at(point: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    return bool((np.abs(point[:2] - other[:2]) <= _SAME).all())
+
+
+def _check_climb(
+    way: _Way,
+    climb: NDArray[np.float64],
+    leg: int | None,
+    world: _World,
+    body_of: Callable[[Element], _Body | None] | None,
+    found: list[Violation],
+) -> float:
+    """Refuse a climb that the robot cannot make, or on which its body meets something; return the clearance.
+
+    The body is judged in slices of height, in each as high as in all of it.
+    """
+    if way.unfit:
+        text = f"the robot cannot use {_who(way.owner)}: {way.unfit},"
+        found.append(_refusal("climb", text, climb[0], 0.0, way.owner, None, leg))
+    clearance, hits = math.inf, list[Violation]()
+    solids = [element for element in world.solids if element.global_id not in way.own]
+    if body_of is None or not solids:
+        return clearance
+    bounds = np.array([element.bounds for element in solids])
+    for a, b in pairwise(climb):
+        rise = abs(float(b[2] - a[2]))
+        if way.is_lift and rise > 0:
+            continue  # inside the car
+        count = max(math.ceil(rise / _SLICE), 1)
+        ends = np.linspace(a, b, count + 1)
+        for begin, end in pairwise(ends):
+            low, high = sorted((float(begin[2]), float(end[2])))
+            track = _track(-1, high, [(leg, np.array([begin[:2], end[:2]]))])
+            band = way.foot, world.band[1] - (high - low)
+            slice_ = replace(world, elements=solids, bounds=bounds, band=band)
+            clearance = min(clearance, _check_bodies(track, slice_, body_of, hits))
+    worst = {(hit.kind, hit.global_id): hit for hit in sorted(hits, key=lambda hit: hit.depth)}
+    found += [replace(hit, storey=None) for hit in worst.values()]
+    return clearance
 
 
 def _parts(

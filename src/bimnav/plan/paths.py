@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -25,6 +25,11 @@ from bimnav.errors import (
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 
+if TYPE_CHECKING:
+    import rustworkx
+
+    from bimnav.links import Link
+
 __all__ = ["Algorithm", "Engine", "Path", "distance_field", "distance_matrix", "find_path", "free_index"]
 
 Algorithm = Literal["auto", "astar", "dijkstra"]
@@ -33,20 +38,22 @@ Engine = Literal["compiled", "rustworkx"]
 _PROVED = 1e-9  # relative; a smaller gap is rounding
 
 _layouts: WeakKeyDictionary[NavGraph, search.Layout] = WeakKeyDictionary()
+_written: WeakKeyDictionary[NavGraph, rustworkx.PyGraph[int, float]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A walk over neighboring cells.
+    """A walk over neighboring cells, and over connectors from storey to storey.
 
     Parameters
     ----------
     indices : (n, 3) int32
         Storey, row and column of every cell, from start to goal.
     length
-        Metres.
+        Metres, over connectors in space.
     cost
-        What was made least: every step's length times the mean of its cells' multipliers, metres.
+        What was made least: every step's length times the mean of its cells' multipliers, and what the
+        connectors cost; metres, or seconds or joules if that is the graph's objective.
     """
 
     graph: NavGraph
@@ -67,9 +74,20 @@ class Path:
         return tuple(Cell(*index) for index in self.indices.tolist())
 
     @cached_property
+    def rides(self) -> tuple[tuple[int, Link], ...]:
+        """The connectors it takes: each with the number of the cell in `cells` from which it leaves."""
+        return tuple(_rides(self.graph, self.indices))
+
+    @cached_property
     def points(self) -> NDArray[np.float64]:
-        """(n, 3) float64, the middles of the cells in world coordinates, metres."""
-        points = self.graph.frame.centers_of(self.indices)
+        """(m, 3) float64, the middles of the cells and the ways over connectors, world metres."""
+        middles = self.graph.frame.centers_of(self.indices)
+        parts, done = [], 0
+        for k, link in self.rides:
+            inner = link.points_from(Cell(*self.indices[k].tolist()))[1:-1]
+            parts += [middles[done : k + 1], inner]
+            done = k + 1
+        points = np.vstack([*parts, middles[done:]])
         points.flags.writeable = False
         return points
 
@@ -125,7 +143,8 @@ def find_path(
     if found is None:
         raise _no_path(graph, begin, end)
     d = graph.frame.cell_size
-    return Path(graph, found.indices, found.length * d, found.cost * d)
+    length = _length(graph, found.indices) if graph.connectors else found.length * d
+    return Path(graph, found.indices, length, found.cost * d * graph.unit_cost)
 
 
 def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[np.float64]:
@@ -141,7 +160,8 @@ def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[n
     Returns
     -------
     distance : (storeys, rows, cols) float64
-        Metres; where cells have multipliers, the cost of a cheapest path. inf where no path leads.
+        Metres; where cells have multipliers, the cost of a cheapest path; in seconds or joules if that is
+        the graph's objective. inf where no path leads.
 
     Raises
     ------
@@ -152,7 +172,7 @@ def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[n
     if not cells:
         raise InputError("a distance field needs a source.", "Give at least one free cell.")
     index = np.array([free_index(graph, cell, "start") for cell in cells])
-    return search.distances(_layout(graph), index, graph.frame.cell_size)
+    return search.distances(_layout(graph), index, graph.frame.cell_size * graph.unit_cost)
 
 
 def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float64]:
@@ -179,15 +199,33 @@ def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float6
     matrix = np.full((len(index), len(index)), np.inf)
     np.fill_diagonal(matrix, 0.0)
     free = np.flatnonzero(np.isfinite(graph.cost.ravel()[index]))
-    matrix[np.ix_(free, free)] = search.distances_between(_layout(graph), index[free], graph.frame.cell_size)
+    scale = graph.frame.cell_size * graph.unit_cost
+    matrix[np.ix_(free, free)] = search.distances_between(_layout(graph), index[free], scale)
     return matrix
 
 
 def _layout(graph: NavGraph) -> search.Layout:
     layout = _layouts.get(graph)
     if layout is None:
-        layout = _layouts[graph] = search.Layout(graph.cost, graph.connectivity)
+        links, costs = graph.links
+        unit = graph.frame.cell_size * graph.unit_cost
+        layout = _layouts[graph] = search.Layout(graph.cost, graph.connectivity, links, costs / unit)
     return layout
+
+
+def _rides(graph: NavGraph, indices: NDArray[np.int32]) -> Iterator[tuple[int, Link]]:
+    for k in np.flatnonzero(np.diff(indices[:, 0])).tolist():
+        link = graph.link_between(*(Cell(*indices[i].tolist()) for i in (k, k + 1)))
+        assert link is not None  # noqa: S101 - no search changes the storey on its own
+        yield k, link
+
+
+def _length(graph: NavGraph, indices: NDArray[np.int32]) -> float:
+    """Return the length of a walk, metres."""
+    storey, row, col = np.abs(np.diff(indices, axis=0)).T
+    steps = (row + col)[storey == 0]
+    flat = float((steps == 1).sum()) + float((steps == 2).sum()) * math.sqrt(2)
+    return graph.frame.cell_size * flat + math.fsum(link.length for _, link in _rides(graph, indices))
 
 
 def _index(graph: NavGraph, cell: Cell, role: str) -> int:
@@ -237,21 +275,22 @@ def _find_explicit(graph: NavGraph, begin: int, end: int, algorithm: Algorithm) 
     """Search the graph written out, with callables that run no Python code."""
     import rustworkx
 
-    layout, d = _layout(graph), graph.frame.cell_size
+    layout = _layout(graph)
     if algorithm == "dijkstra":
         to_go = (0.0).__mul__
     else:
         _, row, col = np.abs(np.indices(graph.cost.shape) - np.array(_cell(graph, end)).reshape(3, 1, 1, 1))
         plan = row + col - (2 - math.sqrt(2)) * np.minimum(row, col) * (graph.connectivity == 8)
-        to_go = (plan * (d * layout.least * layout.shrink * (1 - _PROVED))).ravel().tolist().__getitem__
-    explicit = graph._explicit
+        least = graph.frame.cell_size * graph.unit_cost * layout.least * layout.shrink
+        to_go = (plan * (least * (1 - _PROVED))).ravel().tolist().__getitem__
+    explicit = _written.get(graph)
+    if explicit is None:
+        explicit = _written[graph] = graph.to_rustworkx()
     try:
         nodes = rustworkx.astar_shortest_path(explicit, begin, end.__eq__, float, to_go)
     except rustworkx.NoPathFound as error:
         raise _no_path(graph, begin, end) from error
     flat = np.array(list(nodes), dtype=np.int64)
     indices = np.stack(np.unravel_index(flat, graph.cost.shape), axis=1).astype(np.int32)
-    steps = np.abs(np.diff(indices, axis=0)).sum(axis=1)
-    length = d * (float((steps == 1).sum()) + float((steps == 2).sum()) * math.sqrt(2))
     cost = math.fsum(explicit.get_edge_data(a, b) for a, b in pairwise(nodes))
-    return Path(graph, indices, length, cost)
+    return Path(graph, indices, _length(graph, indices), cost)

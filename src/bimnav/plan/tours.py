@@ -375,14 +375,25 @@ def _polyline(
     skip_first: bool,
     skip_last: bool,
 ) -> NDArray[np.float64]:
-    indices = leg.indices[skip_first : len(leg.indices) - skip_last] if len(leg.indices) > 1 else leg.indices[:0]
-    if len(indices) > 2:
-        steps = np.diff(indices, axis=0)
-        turns = (steps[1:] != steps[:-1]).any(axis=1)
-        indices = indices[np.concatenate([[True], turns, [True]])]
-    points: NDArray[np.float64] = np.vstack([begin, leg.graph.frame.centers_of(indices), end])
+    first, last = (int(skip_first), len(leg.indices) - skip_last) if len(leg.indices) > 1 else (0, 0)
+    parts: list[ArrayLike] = [np.array([begin])]
+    for k, link in leg.rides:
+        parts.append(_turns(leg, first, k + 1))
+        parts.append(link.points_from(Cell(*leg.indices[k].tolist()))[1:-1])
+        first = k + 1
+    points: NDArray[np.float64] = np.vstack([*parts, _turns(leg, first, last), np.array([end])])
     moved = np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME_POINT
     points = points[np.concatenate([[True], moved])]
     points[-1] = end
     points.flags.writeable = False
     return points
+
+
+def _turns(leg: Path, first: int, last: int) -> NDArray[np.float64]:
+    """Return the middles of the cells between two numbers where a leg begins, turns and ends, (n, 3) metres."""
+    indices = leg.indices[first:last]
+    if len(indices) > 2:
+        steps = np.diff(indices, axis=0)
+        turns = (steps[1:] != steps[:-1]).any(axis=1)
+        indices = indices[np.concatenate([[True], turns, [True]])]
+    return leg.graph.frame.centers_of(indices)
