@@ -376,7 +376,7 @@ def _polyline(
     skip_last: bool,
 ) -> NDArray[np.float64]:
     first, last = (int(skip_first), len(leg.indices) - skip_last) if len(leg.indices) > 1 else (0, 0)
-    parts: list[ArrayLike] = [np.array([begin])]
+    parts: list[NDArray[np.float64]] = [np.array([begin])]
     for k, link in leg.rides:
         parts.append(_turns(leg, first, k + 1))
         parts.append(link.points_from(Cell(*leg.indices[k].tolist()))[1:-1])
