@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 from pathlib import Path
 
@@ -185,8 +186,12 @@ def test_a_query_is_evaluated_once(house: Building, monkeypatch: pytest.MonkeyPa
 
 
 def test_a_building_from_a_file_can_be_pickled_and_still_answers(house: Building):
-    again = pickle.loads(pickle.dumps(house))
-    assert picked(again, "IfcWall") == ["Wall"]
+    proxy = house.select("IfcBuildingElementProxy")[0].global_id
+    assert house[proxy].shapes  # an element was looked up before
+    for again in (pickle.loads(pickle.dumps(house)), copy.deepcopy(house)):
+        assert picked(again, "IfcWall") == ["Wall"]
+        [shape] = again[proxy].shapes
+        assert not any(a.flags.writeable for a in (shape.mesh.vertices, shape.mesh.faces, shape.placement, shape.bounds))
 
 
 def test_a_file_that_changed_or_went_is_not_asked(tmp_path: Path):

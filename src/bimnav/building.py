@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -82,6 +81,9 @@ class Mesh:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
 
+    def __reduce__(self) -> tuple[type[Self], tuple[NDArray[np.float64], NDArray[np.int32], str]]:
+        return type(self), (self.vertices, self.faces, self.quality)  # unpickled arrays are read-only as well
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
@@ -109,6 +111,9 @@ class Shape:
         bounds = np.array([points.min(axis=0), points.max(axis=0)]) if len(points) else np.full((2, 3), np.nan)
         bounds.flags.writeable = False
         object.__setattr__(self, "bounds", bounds)
+
+    def __reduce__(self) -> tuple[type[Self], tuple[Mesh, NDArray[np.float64]]]:
+        return type(self), (self.mesh, self.placement)
 
     def world_vertices(self) -> NDArray[np.float64]:
         """Return the vertices in world coordinates, (n, 3) metres."""
@@ -537,7 +542,7 @@ class Building:
 
     @cached_property
     def _by_id(self) -> Mapping[str, Element]:
-        return MappingProxyType({element.global_id: element for element in self.elements})
+        return {element.global_id: element for element in self.elements}
 
     def __getitem__(self, global_id: str) -> Element:
         try:
