@@ -355,6 +355,15 @@ def test_files_are_given_one_by_one_or_as_a_list(two_files):
     assert lifted.select("IfcGeographicElement")[0].bounds[0, 2] == pytest.approx(2.0)
 
 
+def test_terrain_moves_with_its_file_and_is_joined_by_its_global_id(tmp_path: Path):
+    house, garden = tmp_path / "house.ifc", tmp_path / "garden.ifc"
+    house.write_text(model(text_box(300, "site", "IFCSITE")))
+    garden.write_text(model(text_box(300, "site", "IFCSITE"), text_box(400, "hill", "IFCSITE")))
+    building = read_ifc(house, garden, offsets=[None, (0, 0, 2)], cache=False, isolate=False)
+    assert {each.name: each.bounds[0, 2] for each in building.terrain} == {"site": 0.0, "hill": 2.0}
+    assert set(building.ledger.left_out.values()) == {"site"}
+
+
 def test_all_files_are_looked_for_before_any_is_read(two_files, tmp_path):
     told = []
     with pytest.raises(FileMissingError, match="nowhere"):

@@ -347,7 +347,7 @@ def test_the_ground_is_that_of_the_model_where_it_shows_one():
     terrain = prism(
         "site", shapely.box(-9, -9, 12, 12).difference(shapely.box(-0.2, -0.2, 5.2, 4.2)), -1, 0.0, ifc_class="IfcSite"
     )
-    environment = floor_of(house_with_entrance(terrain), outdoors=True)
+    environment = floor_of(replace(house_with_entrance(), terrain=(terrain,)), outdoors=True)
     assert [r.global_id for r in environment.regions if r.source == "outdoors"] == ["site"]
     assert plan(environment, 0, "outdoors").area == pytest.approx(21 * 21 - 5.4 * 4.4, abs=1e-5)
 

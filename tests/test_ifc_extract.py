@@ -12,6 +12,7 @@ import pytest
 
 from bimnav.building import Building, Mesh, Shape
 from bimnav.errors import IfcStructureError, IfcUnitsError
+from bimnav.ifc import _kernel, _tessellate
 from bimnav.ifc._canonical import canonical
 from bimnav.ifc._extract import extract, to_building
 from tests.conftest import REAL_IFC, real_model
@@ -385,6 +386,8 @@ def test_what_is_no_part_of_the_building_is_left_out_by_a_named_rule():
     assert building.ledger.read == (wall.GlobalId,)
     assert_ledger_closes(building)
     assert building[axis_only.GlobalId].shapes == ()  # an element all the same
+    assert {each.ifc_class for each in building.terrain} == {"IfcSite", "IfcGeographicElement"}
+    assert all(each.shapes and each.global_id not in building for each in building.terrain)
     assert set(issue(building, "no-body").global_ids) == {axis_only.GlobalId, clearance.GlobalId}
 
 
@@ -450,6 +453,24 @@ def test_the_heartbeat_names_every_product_before_it_is_touched_and_crashed_ones
     assert building.ledger.lost == {walls[2].GlobalId: "it crashed the geometry kernel"}
     assert building[walls[2].GlobalId].shapes == ()
     assert_ledger_closes(building)
+
+
+def test_a_distrusted_product_is_left_to_the_thorough_kernel(monkeypatch):
+    sketch = Sketch()
+    walls = [sketch.wall(at=(x, 0, 0)) for x in range(3)]
+    touched = []
+
+    def recording(file, products, library, *rest):
+        touched.extend((library, product.GlobalId) for product in products)
+        return _kernel.iterate(file, products, library, *rest)
+
+    monkeypatch.setattr(_tessellate, "iterate", recording)
+    building = sketch.read(thorough={walls[1].GlobalId})
+    assert touched == [
+        *((_kernel.FAST, walls[k].GlobalId) for k in (0, 2)),
+        (_kernel.THOROUGH, walls[1].GlobalId),
+    ]
+    assert volume(building[walls[1].GlobalId].shapes) == pytest.approx(volume(building[walls[0].GlobalId].shapes))
 
 
 # ---------------------------------------------------------------- identity and text

@@ -13,6 +13,8 @@ import textwrap
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -314,6 +316,45 @@ def test_too_many_crashes_are_an_error_that_names_the_product(tmp_path: Path, mo
     assert f"at product {600:022d} (2 of 2)" in str(caught.value)
     assert "unharmed" in str(caught.value)
     assert isinstance(caught.value, RuntimeError)
+
+
+@posix
+def test_terrain_that_crashes_the_kernel_is_left_out_and_blocks_nothing(tmp_path: Path):
+    terrain = [line.replace("IFCBUILDINGELEMENTPROXY", "IFCSITE") for line in crasher(500)]
+    building = read_ifc(written(tmp_path, terrain), cache=False)
+    assert building.ledger.lost == {}
+    assert building.ledger.left_out == {f"{500:022d}": "site"}
+    assert building.terrain == ()
+    [issue] = [issue for issue in building.issues if issue.code == "terrain-not-read"]
+    assert issue.global_ids == (f"{500:022d}",)
+
+
+@pytest.mark.parametrize("error", [ReaderCrashError, ReaderTimeoutError])
+def test_a_product_is_lost_only_if_the_thorough_kernel_fails_as_well(
+    house: Path, monkeypatch: pytest.MonkeyPatch, error: type[ReaderError]
+):
+    packed = read_apart(house).packed
+    asked: list[dict[str, Any]] = []
+    beyond_both = f"{100:022d}"
+
+    def attempt(*_: object, **how: Any) -> SimpleNamespace:
+        asked.append({name: list(value) if isinstance(value, list) else value for name, value in how.items()})
+
+        def run() -> bytes:
+            for suspect in (f"{200:022d}", beyond_both):
+                if suspect not in (*how["skip"], *(g for g in how["thorough"] if g != beyond_both)):
+                    raise error("it failed", "hint", {"stage": "reading", "suspect": suspect})
+            return packed
+
+        return SimpleNamespace(run=run)
+
+    monkeypatch.setattr(watch, "_Attempt", attempt)
+    reading = read_apart(house)
+    assert list(reading.lost) == [beyond_both]
+    assert reading.is_repeatable == (error is ReaderCrashError)
+    assert [how["careful"] for how in asked] == [False, True, True, True]
+    assert asked[-1]["thorough"] == [f"{200:022d}", beyond_both]
+    assert asked[-1]["skip"] == [beyond_both]
 
 
 @posix

@@ -191,7 +191,9 @@ def test_a_building_from_a_file_can_be_pickled_and_still_answers(house: Building
     for again in (pickle.loads(pickle.dumps(house)), copy.deepcopy(house)):
         assert picked(again, "IfcWall") == ["Wall"]
         [shape] = again[proxy].shapes
-        assert not any(a.flags.writeable for a in (shape.mesh.vertices, shape.mesh.faces, shape.placement, shape.bounds))
+        assert not any(
+            a.flags.writeable for a in (shape.mesh.vertices, shape.mesh.faces, shape.placement, shape.bounds)
+        )
 
 
 def test_a_file_that_changed_or_went_is_not_asked(tmp_path: Path):

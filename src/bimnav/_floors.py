@@ -35,7 +35,6 @@ _REACH = 0.5  # metres; a door is joined to floor this near to its opening
 _PRESENT = 0.02  # square metres of floor before a door; less is a corner of something else
 _DOOR_DEPTH = 0.15  # metres a door without an opening reaches through its curtain wall, to either side
 _MARGIN = 2.0  # metres of ground around a building whose ground is not modelled
-_TERRAIN = ("IfcSite", "IfcGeographicElement")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -228,12 +227,12 @@ class _Survey:
         indoors = unite([self.shell.inside(level), self.shell.walls(level), floor.plan])
         for top in self.ground.tops:
             if top.source is not None and abs(top.height - level) <= self.step:
-                yield Piece(top.element.global_id, top.element.name, top.plan.difference(indoors), "outdoors")
-        for site in self.building.elements:
-            if site.ifc_class in _TERRAIN:
-                high = part_in(site.shapes, level + self.step, level + self.step + self.height)
-                ground = part_in(site.shapes, level - self.step, level + self.step).difference(high)
-                yield Piece(site.global_id, site.name, ground.difference(indoors), "outdoors")
+                around = opened(top.plan.difference(indoors), _NARROW)
+                yield Piece(top.element.global_id, top.element.name, around, "outdoors")
+        for site in self.building.terrain:
+            high = part_in(site.shapes, level + self.step, level + self.step + self.height)
+            ground = part_in(site.shapes, level - self.step, level + self.step).difference(high)
+            yield Piece(site.global_id, site.name, ground.difference(indoors), "outdoors")
 
     def with_doorways(self, floors: Sequence[Floor]) -> list[Floor]:
         """Add doorways and passages to the levels they open to."""

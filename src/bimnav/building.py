@@ -472,6 +472,8 @@ class Building:
         From the lowest to the highest.
     spaces, elements, doors, openings, connectors
         What the model holds; `elements` are all products with or without geometry but openings and spaces.
+    terrain
+        The surface of sites: ground outside, and no obstacle. In the ledger it counts as left out.
     issues
         What was lost or looks wrong.
     ledger
@@ -505,6 +507,7 @@ class Building:
     doors: tuple[Door, ...] = ()
     openings: tuple[Opening, ...] = ()
     connectors: tuple[Connector, ...] = ()
+    terrain: tuple[Element, ...] = field(default=(), kw_only=True)
     issues: tuple[Issue, ...] = ()
     ledger: Ledger = field(default_factory=Ledger)
     schema: str = ""

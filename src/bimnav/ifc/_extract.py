@@ -17,7 +17,7 @@ from bimnav.ifc._geometry import Geometry, read_geometry
 from bimnav.ifc._georeference import anchor_rows, georeference_row
 from bimnav.ifc._kernel import Entity, File
 from bimnav.ifc._model import Model, to_building
-from bimnav.ifc._products import BodyFinder, identify, left_out_by_class, sanitize, sorted_of
+from bimnav.ifc._products import BodyFinder, identify, is_terrain, left_out_by_class, sanitize, sorted_of
 from bimnav.ifc._relations import Relations, open_circles
 from bimnav.ifc._semantics import Rows, derived_storey, lowest_floor, storey_rows, text_of
 from bimnav.ifc._units import length_unit
@@ -39,6 +39,7 @@ def extract(
     *,
     heartbeat: Heartbeat = _silent,
     skip: Collection[str] = (),
+    thorough: Collection[str] = (),
     careful: bool = False,
     log: Any = None,
 ) -> Model:
@@ -56,6 +57,8 @@ def extract(
         before the kernel touches it; empty while it touches several, or none.
     skip
         GlobalIds, as given to `heartbeat`, of products that crashed the kernel before; they are lost.
+    thorough
+        The same of products that crashed the fast kernel; the thorough one reads them.
     careful
         Whether to give the kernel one product at a time, so that there is no doubt which one crashes it.
     log
@@ -79,8 +82,9 @@ def extract(
     asked = [product for product in products if product.Representation]
     no_part = left_out_by_class(file)
     solids, contexts, left_out, lost = _sort_out(asked, no_part)
-    lost |= {step_id: _CRASHED for step_id in solids if ids[step_id] in skip}
-    wanted = [product for product in asked if product.id() in solids and product.id() not in lost]
+    skipped = {step_id for step_id in solids if ids[step_id] in skip}
+    lost |= dict.fromkeys(skipped - left_out.keys(), _CRASHED)
+    wanted = [product for product in asked if product.id() in solids and product.id() not in skipped]
     begun: set[int] = set()
 
     def working_on(step_id: int) -> None:
@@ -88,10 +92,15 @@ def extract(
             begun.add(step_id)
         heartbeat(max(0, len(begun) - 1), len(wanted), ids.get(step_id, ""))
 
-    geometry = read_geometry(file, wanted, solids, contexts, relations.openings_of(), working_on, careful=careful)
+    distrusted = {step_id for step_id in solids if ids[step_id] in thorough}
+    geometry = read_geometry(
+        file, wanted, solids, contexts, relations.openings_of(), working_on, thorough=distrusted, careful=careful
+    )
     heartbeat(len(wanted), len(wanted), "")
-    lost = dict(sorted((lost | geometry.lost).items()))
+    lost |= {step_id: reason for step_id, reason in geometry.lost.items() if step_id not in left_out}
+    lost = dict(sorted(lost.items()))
     findings.about_geometry(geometry, lost, left_out)
+    findings.about_terrain(skipped & left_out.keys(), geometry, left_out)
     meshes, arrays, shapes = geometry.pack(product.id() for product in wanted)
     rows = Rows(file, ids, relations, geometry.bounds, lambda step_id: shapes.get(step_id, []), unit_scale)
     parts = [product for product in products if product.id() not in no_part]
@@ -103,6 +112,7 @@ def extract(
         "georeference": georeference_row(file, unit_scale, findings),
         "anchors": anchor_rows(file, unit_scale),
         "meshes": meshes,
+        "terrain": [rows.element(p) for p in wanted if p.id() in left_out and geometry.shapes[p.id()]],
         **_contents(file, parts, rows, geometry, findings, storey_rows(file, ids, unit_scale)),
         "issues": findings.rows,
         "ledger": {
@@ -120,7 +130,10 @@ def extract(
 def _sort_out(
     asked: Sequence[Entity], no_part: Mapping[int, str]
 ) -> tuple[dict[int, list[Entity]], set[int], dict[int, str], dict[int, str]]:
-    """Find the solids of each product, their contexts, and which products to leave out or give up, and why."""
+    """Find the solids of each product, their contexts, and which products to leave out or give up, and why.
+
+    Terrain is left out, for it blocks nothing, and has solids.
+    """
     finder = BodyFinder()
     solids: dict[int, list[Entity]] = {}
     contexts: set[int] = set()
@@ -128,16 +141,20 @@ def _sort_out(
     lost: dict[int, str] = {}
     for product in asked:
         step_id = product.id()
+        rule = no_part.get(step_id)
+        own: list[Entity] = []
         try:
-            own, where = ([], set()) if step_id in no_part else finder.solids_of(product)
+            if rule is None or is_terrain(rule):
+                own, where = finder.solids_of(product)
+                contexts |= where
         except (AttributeError, RuntimeError, TypeError):
-            lost[step_id] = _DAMAGED
-            continue
+            if rule is None:
+                lost[step_id] = _DAMAGED
+                continue
         if own:
             solids[step_id] = own
-            contexts |= where
-        else:
-            left_out[step_id] = no_part.get(step_id, "no-body")
+        if rule or not own:
+            left_out[step_id] = rule or "no-body"
     return solids, contexts, left_out, lost
 
 

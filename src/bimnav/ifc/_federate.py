@@ -220,6 +220,7 @@ def _join(first: Building, other: Building, aliases: dict[str, str]) -> Building
         spaces=tuple(merged(_without_lost(first.spaces, first, other), spaces).values()),
         elements=tuple(elements.values()),
         openings=tuple(openings.values()),
+        terrain=tuple(merged(first.terrain, other.terrain).values()),
         doors=tuple(
             replace(
                 door,

@@ -118,7 +118,7 @@ class Findings:
         self.add(
             "open-shape",
             "{n} products have bodies that do not close; they are taken as sheets.",
-            [step_id for step_id in geometry.shapes if geometry.is_open(step_id)],
+            [step_id for step_id in geometry.shapes if geometry.is_open(step_id) and step_id not in left_out],
             severity="info",
         )
         self.add(
@@ -138,6 +138,16 @@ class Findings:
             "{n} products have a representation, but no body: only an axis, a box or a plan symbol.",
             [step_id for step_id, rule in left_out.items() if rule == "no-body"],
             severity="info",
+        )
+
+    def about_terrain(self, skipped: Iterable[int], geometry: Geometry, left_out: Mapping[int, str]) -> None:
+        """Note which surfaces of the ground could not be read; `skipped` are those that crashed the kernel."""
+        self.add(
+            "terrain-not-read",
+            "the surface of {n} sites could not be read, or not all of it.",
+            sorted({*skipped, *(geometry.lost.keys() & left_out.keys())}),
+            severity="info",
+            hint="It matters only with outdoors=True.",
         )
 
     def about_storeys(self, storeys: Sequence[Row], elements: Sequence[Row], spaces: Sequence[Row]) -> None:

@@ -183,6 +183,7 @@ def moved(building: Building, placement: Placement) -> Building:
         spaces=tuple(of(building.spaces).values()),
         elements=tuple(elements.values()),
         openings=tuple(openings.values()),
+        terrain=tuple(of(building.terrain).values()),
         doors=tuple(
             replace(
                 door,

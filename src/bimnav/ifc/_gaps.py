@@ -124,7 +124,8 @@ def note_lost(model: Model, file: Any, broken: Mapping[int, str], shaped: Mappin
     if not broken and not unseen:
         return
     ids, _ = identify(sorted_of(file, "IfcProduct"))
-    reasons = dict(broken)
+    by_class = {g for g, rule in ledger["left_out"].items() if rule != "no-body"}
+    reasons = {step_id: reason for step_id, reason in broken.items() if ids[step_id] not in by_class}
     for step_id in unseen:
         if step_id not in ids:  # its class is unknown
             kind, written = shaped[step_id]

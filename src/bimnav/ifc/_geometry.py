@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -102,6 +102,7 @@ def read_geometry(
     openings: Mapping[int, Sequence[int]],
     working_on: Callable[[int], None],
     *,
+    thorough: Collection[int] = (),
     careful: bool = False,
 ) -> Geometry:
     """Tessellate products and cut their openings.
@@ -118,10 +119,12 @@ def read_geometry(
         Step id of a host to the step ids of what cuts it.
     working_on
         Called with the step id of each product before it is touched; 0 before all are.
+    thorough
+        Step ids of products that the fast kernel must not touch.
     careful
         Whether to touch only one at a time.
     """
-    tessellator = Tessellator(file, solids, contexts, working_on, careful=careful)
+    tessellator = Tessellator(file, solids, contexts, working_on, thorough=thorough, careful=careful)
     readings = tessellator.read(products)
     geometry = Geometry(meshes=tessellator.meshes)
     cutter = Cutter(geometry.meshes)

@@ -49,6 +49,7 @@ class Model:
         - `meshes`: `[{quality}]`, one per mesh of the arrays
         - `elements`: `[{global_id, ifc_class, name, type_name, object_type, predefined_type, tag,
           storey, space, parent, step_id, shapes: [index of a shape, ...]}]`
+        - `terrain`: the same of surfaces of the ground
         - `spaces`: `[{global_id, name, long_name, type_name, object_type, predefined_type, storey, step_id,
           shapes}]`
         - `openings`: `[{global_id, host, fillings: [global_id], shapes}]`
@@ -110,6 +111,7 @@ def to_building(
         ),
         openings=tuple(openings.values()),
         connectors=tuple(Connector(**row | {"parts": tuple(row["parts"])}) for row in tables["connectors"]),
+        terrain=tuple(Element(**with_shapes(row)) for row in tables["terrain"]),
         issues=tuple(Issue(**row | {"global_ids": tuple(row["global_ids"])}) for row in tables["issues"]),
         ledger=Ledger(
             tuple(ledger["asked"]),

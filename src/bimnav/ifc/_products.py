@@ -18,6 +18,7 @@ __all__ = [
     "identify",
     "is_body",
     "is_global_id",
+    "is_terrain",
     "left_out_by_class",
     "sanitize",
     "sorted_of",
@@ -68,6 +69,7 @@ _SOLIDS = (
     "IfcSurface",
     "IfcSectionedSpine",
 )
+_TERRAIN = ("site", "terrain")  # rules; what they leave out is ground
 _GLOBAL_ID = re.compile(r"[0-9A-Za-z_$]{22}")
 
 
@@ -155,6 +157,11 @@ def left_out_by_class(file: File) -> dict[int, str]:
         if product.PredefinedType == "TERRAIN":
             rules.setdefault(product.id(), "terrain")
     return rules
+
+
+def is_terrain(rule: str | None) -> bool:
+    """Tell whether what a rule leaves out is ground to walk on, outdoors."""
+    return rule in _TERRAIN
 
 
 def is_body(identifier: str | None) -> bool:

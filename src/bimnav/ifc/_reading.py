@@ -33,6 +33,7 @@ def read(
     listener: Listener,
     *,
     skip: Collection[str] = (),
+    thorough: Collection[str] = (),
     careful: bool = False,
     check: bool = True,
 ) -> Model:
@@ -48,6 +49,8 @@ def read(
         Told how far the work is.
     skip
         GlobalIds of products the kernel must not touch; they count as lost.
+    thorough
+        GlobalIds of products the fast kernel must not touch.
     careful
         Whether to give the kernel one product at a time.
     check
@@ -67,7 +70,7 @@ def read(
     del text
     listener.stage("reading")
     try:
-        model = extract(file, heartbeat=listener.beat, skip=skip, careful=careful, log=log)
+        model = extract(file, heartbeat=listener.beat, skip=skip, thorough=thorough, careful=careful, log=log)
     except (IfcStructureError, IfcUnitsError) as error:  # which do not know the name
         raise type(error)(f"{path.name}: {error.message}", error.hint, {"file": path.name, **error.context}) from error
     except GeometryError as error:  # nobody foresaw it: as good as a crash at the product in hand

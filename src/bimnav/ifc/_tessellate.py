@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -64,6 +64,8 @@ class Tessellator:
         Step ids of the representation contexts in which bodies are looked for.
     working_on
         Called with the step id of each product before the kernel touches it; with 0 before it touches all.
+    thorough
+        Step ids of products that the fast kernel must not touch.
     careful
         Whether to give the kernel one product at a time, which is slower, and never touches all.
     """
@@ -75,6 +77,7 @@ class Tessellator:
         contexts: set[int],
         working_on: Callable[[int], None],
         *,
+        thorough: Collection[int] = (),
         careful: bool = False,
     ) -> None:
         self.file = file
@@ -82,6 +85,7 @@ class Tessellator:
         self._solids = solids
         self._contexts = contexts
         self._working_on = working_on
+        self._thorough = thorough
         self._careful = careful
         self._index: dict[tuple[bytes, bytes], int] = {}
         self._known: dict[tuple[str, bool, str], tuple[int, frozenset[int]]] = {}
@@ -92,9 +96,10 @@ class Tessellator:
         What the fast kernel drops, leaves incomplete or complains about is clipped by our own means or
         handed to the thorough one; the better of the two readings counts.
         """
-        readings = self._iterate(products, FAST)
+        trusted = [product for product in products if product.id() not in self._thorough]
+        readings = {product.id(): Reading() for product in products} | self._iterate(trusted, FAST)
         doubtful = [product for product in products if not self._is_complete(product, readings)]
-        clipped = self._clip_all(doubtful)
+        clipped = self._clip_all([product for product in doubtful if product.id() not in self._thorough])
         readings |= clipped
         left = [product for product in doubtful if product.id() not in clipped]
         for step_id, second in self._iterate(left, THOROUGH).items():

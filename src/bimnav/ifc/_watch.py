@@ -40,6 +40,7 @@ __all__ = ["Limits", "Reading", "read_apart", "read_here"]
 
 _LOG = logging.getLogger(__name__)
 _QUARANTINE_LIMIT = 8
+_PATIENT = 4  # stalls that a reading has time for, with a rest to read the file without what stalls
 _LONGEST_LINE = 1 << 16
 _LEAST_SILENCE = 5.0  # seconds; a busy machine may take as long to start the process
 _LEAST_MEMORY = 1024**3
@@ -61,7 +62,7 @@ class Limits:
     timeout
         Seconds for the whole reading.
     silence
-        Seconds for any one product, at most a third of `timeout`; more for a large file, which takes
+        Seconds for any one product, at most a quarter of `timeout`; more for a large file, which takes
         longer to open.
     memory
         Bytes of address space, where the system can limit it; None for what the machine has.
@@ -74,7 +75,7 @@ class Limits:
     def __post_init__(self) -> None:
         if not (0 < self.timeout < math.inf and 0 < self.silence < math.inf):
             raise ValueRangeError(f"timeout is {self.timeout} s.", "Give a number of seconds above 0.")
-        patience = max(self.timeout / 3, _LEAST_SILENCE)  # time is left to read the file without what stalls
+        patience = max(self.timeout / _PATIENT, _LEAST_SILENCE)
         object.__setattr__(self, "silence", min(self.silence, patience))
         if self.memory is not None and not self.memory >= _LEAST_MEMORY:
             hint = f"Allow at least {_LEAST_MEMORY}; the reader alone needs half of that."
@@ -106,9 +107,9 @@ def read_apart(
 ) -> Reading:
     """Read a file in a process of its own.
 
-    A product that crashes or stalls the geometry kernel is set aside and the file is read again without
-    it, up to eight times; it is listed in the ledger as lost. If it is not known which one did, the
-    kernel gets one at a time.
+    If a product crashes or stalls the geometry kernel, the file is read again: the products one at a time,
+    so that there is no doubt which one does, and that one by the thorough kernel alone. If that fails as
+    well, the product is set aside and listed in the ledger as lost; up to eight may be.
 
     Parameters
     ----------
@@ -131,28 +132,36 @@ def read_apart(
     limits = limits or Limits()
     deadline = time.monotonic() + limits.timeout
     lost: dict[str, str] = {}
+    thorough: list[str] = []
     repeatable = True
     careful = False
     while True:
         try:
-            packed = _Attempt(path, limits, deadline, list(lost), careful, report, check).run()
+            packed = _Attempt(
+                path, limits, deadline, report, skip=list(lost), thorough=thorough, careful=careful, check=check
+            ).run()
         except (ReaderCrashError, ReaderTimeoutError) as error:
             suspect = error.context.get("suspect")
-            if suspect == "" and error.context["stage"] == "reading" and not careful:
-                careful = True
-                _LOG.info("%s: reading again, one product at a time: %s", path.name, error)
-                continue
-            if not suspect or suspect in lost or len(lost) == _QUARANTINE_LIMIT:
+            is_reading = suspect is not None and error.context["stage"] == "reading"
+            if not is_reading or suspect in lost or (careful and not suspect):
                 raise
             stalled = isinstance(error, ReaderTimeoutError)
             repeatable = repeatable and not stalled
-            lost[suspect] = f"{'stalled' if stalled else 'crashed'} the geometry kernel"
-            _LOG.warning("%s: product %s %s; reading again without it", path.name, suspect, lost[suspect])
+            if careful and suspect in thorough:
+                if len(lost) == _QUARANTINE_LIMIT:
+                    raise
+                lost[suspect] = f"{'stalled' if stalled else 'crashed'} the geometry kernel"
+                _LOG.warning("%s: product %s %s; reading again without it", path.name, suspect, lost[suspect])
+            else:
+                thorough += [suspect] if suspect else []
+                _LOG.info("%s: reading again, one product at a time: %s", path.name, error)
+            careful = True
             continue
         try:
             model = unpack(packed)
             if lost:
-                model.tables["ledger"]["lost"].update(lost)
+                known = model.tables["ledger"]["lost"]
+                known.update({global_id: reason for global_id, reason in lost.items() if global_id in known})
                 packed = pack(model)
         except (ValueError, LookupError, AttributeError, TypeError) as error:
             raise ReaderCrashError(
@@ -223,17 +232,12 @@ class _Attempt:
         path: Path,
         limits: Limits,
         deadline: float,
-        skip: list[str],
-        careful: bool,
         report: Report,
-        check: bool,
+        **how: Any,
     ) -> None:
         self.path, self.limits, self.deadline, self.report = path, limits, deadline, report
-        self.job = {
+        self.job = how | {
             "path": str(path.absolute()),
-            "skip": skip,
-            "careful": careful,
-            "check": check,
             "seconds": math.ceil(limits.timeout) + 5,  # of one processor; meant for a worker that lost its caller
             "memory": _physical_memory() if limits.memory is None else int(limits.memory),
         }

@@ -57,7 +57,8 @@ def main() -> None:
         from bimnav.ifc._store import pack
 
         folder = Path(job["folder"])
-        model = read(Path(job["path"]), folder, line, skip=job["skip"], careful=job["careful"], check=job["check"])
+        how = {name: job[name] for name in ("skip", "thorough", "careful", "check")}
+        model = read(Path(job["path"]), folder, line, **how)
         (folder / MODEL).write_bytes(pack(model))
         line.send(done=True)
     except BimnavError as error:
