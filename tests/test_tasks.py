@@ -435,8 +435,9 @@ def test_all_mistakes_are_told_at_once_each_with_its_line(tmp_path):
         "8: unknown key 'filtr' in tasks.a.targets[0]; did you mean 'filter'?",
         "9: tasks.a.targets[0].words = 'spill': should be a list.",
         "10: unknown key 'factor' in tasks.a.targets[0]; "
-        "known are filter, words, exclude_words, label, storeys, spaces, use, classification, properties, systems, "
-        "expect, destination, service_time, priority, due, abilities.",
+        "known are filter, words, exclude_words, label, storeys, spaces, use, classification, "
+        "exclude_classification, properties, leads_outside, systems, expect, "
+        "destination, service_time, priority, due, abilities.",
         "12: tasks.a.targets[1].words = ['--']: '--' is not a word. A word has letters or digits.",
         "15: tasks.a.targets[1].expect = 'many': should be a comparison with a whole number, such as '>=1'.",
         "16: tasks.a.targets[1].filter = '': should not be empty.",

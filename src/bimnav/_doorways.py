@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
@@ -24,6 +25,8 @@ _BELOW = 1.0  # metres; a floor farther below a door is not the one it opens to
 _ABOVE = 0.35  # metres; a floor finish may lie this much above the bottom of an opening
 _SLIVER, _EDGE = 1e-9, 1e-9  # metres or square metres in plan view; share of a side
 _SHEET = 1e-3  # metres
+_FLIGHT = 1.5  # metres; a room may lie a few steps above or below a door, and the ground outside as well
+_BEYOND = np.arange(1.0, 4.1, 0.5)  # metres behind a door; a stairwell without a room of its own is no deeper
 _PLATE = 1.5  # a plan view this many times longer than wide shows which way a leaf lies
 
 
@@ -139,7 +142,14 @@ def measured(building: Building) -> tuple[Door, ...]:
     slabs = _Ground([e for e in building.elements if e.ifc_class.startswith("IfcSlab") and e.predefined_type != "ROOF"])
     elevations = np.array([storey.elevation for storey in building.storeys])
     ways = [doorway_of(door, building) for door in building.doors]
-    return tuple(_measured(door, way, rooms, slabs, elevations) for door, way in zip(building.doors, ways, strict=True))
+    doors = [_measured(door, way, rooms, slabs, elevations) for door, way in zip(building.doors, ways, strict=True)]
+    outer = {
+        door.global_id: way.bottom
+        for door, way in zip(doors, ways, strict=True)
+        if way is not None and len(door.spaces) == 1 and rooms.is_open(way)
+    }
+    ground = min(outer.values(), default=0.0) + _FLIGHT
+    return tuple(replace(door, to_outside=outer.get(door.global_id, math.inf) <= ground) for door in doors)
 
 
 def _measured(door: Door, way: Doorway | None, rooms: _Ground, slabs: _Ground, elevations: NDArray[np.float64]) -> Door:
@@ -167,6 +177,17 @@ class _Ground:
         placed = [(product, bounds) for product in products if (bounds := product.bounds) is not None]
         self._products = [product for product, _ in placed]
         self._bounds = np.array([bounds for _, bounds in placed]).reshape(-1, 2, 3)
+
+    def is_open(self, way: Doorway) -> bool:
+        """Tell whether no room lies straight ahead at one side of a door, nor a few steps up or down from it."""
+        low, high = self._bounds[:, 0], self._bounds[:, 1]
+        near = np.flatnonzero((low[:, 2] <= way.bottom + _FLIGHT) & (high[:, 2] >= way.bottom - _FLIGHT)).tolist()
+        for side in (-1, 1):
+            points = [way.center + side * (way.depth / 2 + step) * way.across for step in (*_SIDESTEPS, *_BEYOND)]
+            over = [k for k in near for p in points if (low[k, :2] <= p).all() and (p <= high[k, :2]).all()]
+            if not any(_heights_at(s, p) for k in dict.fromkeys(over) for s in self._products[k].shapes for p in points):
+                return True
+        return False
 
     def beside(self, way: Doorway, side: int, *, lowest: bool) -> tuple[str | None, float | None]:
         """Return what a door opens to at a side, and its floor: the lowest or the highest surface at that point.

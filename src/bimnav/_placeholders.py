@@ -17,7 +17,13 @@ _NOTHING = re.compile(
 def is_placeholder(name: str, value: Any) -> bool:
     """Tell whether the value of a property is but the property's own name, or a word for nothing.
 
-    >>> is_placeholder("SerialNumber", "SerialNumber"), is_placeholder("SerialNumber", "GH468642")
+    >>> is_placeholder("SerialNumber", "Serial Number"), is_placeholder("SerialNumber", "GH468642")
     (True, False)
     """
-    return isinstance(value, str) and (value.strip() == name or _NOTHING.fullmatch(value.strip()) is not None)
+    if not isinstance(value, str):
+        return False
+    return _NOTHING.fullmatch(value.strip()) is not None or _bare(value) == _bare(name or "")
+
+
+def _bare(text: str) -> str:
+    return text.replace(" ", "").casefold()

@@ -258,6 +258,9 @@ class Door:
     spaces
         GlobalIds of the rooms at its sides: two for an inner door, the same twice for one within a room,
         one for a door to the outside.
+    to_outside
+        Whether there is a room at one side only, and the door lies near the lowest of those of which that is
+        true: it leads to the ground outside, as far as geometry tells, and not to a balcony.
 
     A building measures what its doors leave open.
     """
@@ -269,6 +272,7 @@ class Door:
     clear_width: float | None = None
     sill: float | None = None
     spaces: tuple[str, ...] = ()
+    to_outside: bool = False
 
     @property
     def global_id(self) -> str:

@@ -106,7 +106,8 @@ def parse_condition(text: str) -> Condition:
     return Condition(set_name.strip(), (found["quoted_name"] or found["name"]).strip(), sign, value)
 
 
-def _fits(pattern: str, name: str) -> bool:
+def _fits(pattern: str, name: str | None) -> bool:
+    name = name or ""  # damaged files have sets and properties without one
     return fnmatch.fnmatchcase(name.strip().casefold(), pattern.casefold().replace("[", "[[]"))
 
 

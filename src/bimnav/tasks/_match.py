@@ -161,18 +161,41 @@ def _by_facts(rule: Rule, building: Building) -> Test:
     """Test classification, properties and systems; what the rule does not ask for is not read."""
     conditions = [parse_condition(text) for text in rule.properties]
     systems = [(word, needle(word)) for word in rule.systems]
-    asks = bool(conditions or systems or rule.classification)
+    asks = bool(conditions or systems or rule.classification or rule.exclude_classification)
 
     def test(product: Product) -> str | None:
         if not asks:
             return ""
         facts = building.facts(product.global_id)
+        if _classified(facts, rule.exclude_classification):
+            return None
         reasons = [condition.met_by(facts) for condition in conditions]
         if rule.classification:
             reasons.append(_classified(facts, rule.classification))
         if systems:
             reasons.append(next((f"system {n!r} {h}" for n in facts.systems if (h := _hit(haystack(n), systems))), ""))
         return ", ".join(reasons) if all(reasons) else None
+
+    return test
+
+
+def _by_door(rule: Rule, building: Building) -> Test:
+    """Test whether a door leads outside: what the model says goes before what geometry tells."""
+    doors = {door.global_id: door for door in building.doors} if rule.leads_outside else {}
+    said = [parse_condition(text) for text in ("*.FireExit = true", "*.IsExternal = true")]
+    denied = parse_condition("*.IsExternal = false")
+
+    def test(product: Product) -> str | None:
+        if not rule.leads_outside:
+            return ""
+        door = doors.get(product.global_id)
+        if door is None or len(set(door.spaces)) > 1:
+            return None
+        facts = building.facts(product.global_id)
+        told = next(filter(None, (condition.met_by(facts) for condition in said)), "")
+        if told or denied.met_by(facts):
+            return told or None
+        return "a room lies at one side of it only, near the ground" if door.to_outside else None
 
     return test
 
@@ -186,7 +209,7 @@ def _classified(facts: Facts, wanted: Iterable[str]) -> str:
     return ""
 
 
-_TESTS = (_by_name, _by_place, _by_use, _by_facts)  # cheapest first
+_TESTS = (_by_name, _by_place, _by_use, _by_door, _by_facts)  # cheapest first
 
 
 def _room_of(product: Product, spaces: Sequence[Space]) -> Space | None:

@@ -116,9 +116,11 @@ class RuleTable(_Table):
     spaces: Words = Field([], description="Names or GlobalIds of the rooms it looks in.")
     use: Words = Field([], description="Words in the name of the room, or of the room that the element is in.")
     classification: Words = Field([], description="Beginnings of codes, such as 'OmniClass: 23.40', or titles.")
+    exclude_classification: Words = Field([], description="None of these fits.")
     properties: Annotated[list[Annotated[str, Field(min_length=1)]], AfterValidator(_conditions)] = Field(
         [], description="Conditions that all hold, such as \"Pset_DoorCommon.FireRating != ''\"."
     )
+    leads_outside: bool = Field(False, description="Only doors that lead outside, as the model or geometry tells.")
     systems: Words = Field([], description="Words in the names of the systems it is part of.")
     expect: Annotated[str, AfterValidator(_expected)] = Field(
         "", json_schema_extra={"pattern": f"{EXPECT}|^$"}, description="How many it must find, such as '>=1'."

@@ -31,6 +31,17 @@ Side: TypeAlias = Literal["front", "back", "any"]
 DoorState: TypeAlias = Literal["locked", "automatic", "closed", "open"]
 Objective: TypeAlias = Literal["distance", "time", "energy"]
 
+_WORDS = (
+    "words",
+    "exclude_words",
+    "storeys",
+    "spaces",
+    "use",
+    "classification",
+    "exclude_classification",
+    "systems",
+    "abilities",
+)
 RULE_LISTS = ("targets", "obstacles", "ignore", "avoid", "restricted", "exits", "docks", "doors")
 EXPECT = r"^\s*(>=|<=|==|>|<|=)?\s*(\d{1,9})\s*$"
 
@@ -94,7 +105,9 @@ class Rule:
 
     What the filter picks is kept if all that the rule says besides holds, too. Words are found whole, in
     any case, with or without accents: `Müll` is found in `MULL:2` and not in `Mullion`. A word may be
-    several: `banana peel`. Words in scripts that do not part them with spaces are found anywhere.
+    several: `banana peel`. A star in front of a word stands for the beginning of a compound, one behind it
+    for an ending: `*ventil` is found in `Absperrventil`. Words in scripts that do not part them with spaces
+    are found anywhere.
 
     Parameters
     ----------
@@ -116,11 +129,16 @@ class Rule:
     classification
         Beginnings of codes, of which one must fit: `23.40.20`, `OmniClass: 23-40 20`, or words of a title.
         Case, spaces, dots and dashes do not count; product and type do, and codes kept in properties.
+    exclude_classification
+        The same; none of them may fit.
     properties
         Conditions that all must hold, such as `Pset_DoorCommon.FireRating != ''`. `*` stands for anything.
         The product's own values go before its type's; placeholders count as empty.
     systems
         Words in the names of systems that the element, or a system it belongs to, is part of.
+    leads_outside
+        Whether to pick doors alone that lead outside: the model says so (`IsExternal`, `FireExit`), or says
+        nothing and there is a room at one side only, near the ground.
     destination
         In `Task.targets`: where the robot goes for it; None is the task's.
     service_time
@@ -160,8 +178,10 @@ class Rule:
     expect: str = ""
     use: tuple[str, ...] = ()
     classification: tuple[str, ...] = ()
+    exclude_classification: tuple[str, ...] = ()
     properties: tuple[str, ...] = ()
     systems: tuple[str, ...] = ()
+    leads_outside: bool = False
     destination: Destination | None = None
     service_time: float | None = None
     priority: float | None = None
@@ -172,7 +192,7 @@ class Rule:
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("words", "exclude_words", "storeys", "spaces", "use", "classification", "systems", "abilities"):
+        for name in _WORDS:
             object.__setattr__(self, name, checked_words(getattr(self, name)))
         object.__setattr__(self, "properties", checked_conditions(self.properties))
         object.__setattr__(self, "destination", checked_destination("destination", self.destination))

@@ -39,5 +39,14 @@ def haystack(text: str) -> str:
 
 
 def needle(word: str) -> str:
-    """Return what to seek in a haystack: whole words, or any part where a script does not part words."""
-    return tokens(word) if _UNPARTED.search(word) else f" {tokens(word)} "
+    """Return what to seek in a haystack: whole words, or any part where a script does not part words.
+
+    A star in front finds the ends of words, and one behind their beginnings.
+
+    >>> needle("*ventil") in haystack("Absperrventil DN20"), needle("*ventil") in haystack("Ventilator")
+    (True, False)
+    """
+    if _UNPARTED.search(word):
+        return tokens(word)
+    word = word.strip()
+    return f"{'' if word.startswith('*') else ' '}{tokens(word)}{'' if word.endswith('*') else ' '}"

@@ -1,0 +1,246 @@
+"""The built-in tasks: what they find among labelled elements of real models, and among names made up to mislead."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter, defaultdict
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import bimnav as bn
+from bimnav.building import Building, Element, Space, Storey
+from bimnav.tasks import match
+from tests.conftest import real_model
+
+LABELS = Path(__file__).with_name("labels.csv")
+
+# Each label is what someone who reads the element's names, type, properties and geometry would call it.
+ROOMS = (
+    "bedroom break_room classroom corridor gallery hall_room kitchen living medical meeting office reception room storage"
+)
+# a task, the labels that it is to find, and those of which reasonable people may say either
+WANTED = {
+    "cleaning": ("", ""),
+    "cleaning_rooms": (f"{ROOMS} wet_room", "utility waste_room"),
+    "delivery": (ROOMS.replace("corridor ", ""), "utility waste_room"),
+    "disinfection": (
+        "basin bath counter desk door grab_bar lift lift_door paper_holder railing shower switch table toilet "
+        "waste_receptacle",
+        "cabinet kitchen_unit",
+    ),
+    "emergency_egress": ("exit", "exit_unknown"),
+    "inspection_building": ("beam brace column curtain_wall door rafter roof window", ""),
+    "inspection_fire": ("alarm_panel detector fire_door sprinkler", ""),
+    "inspection_mep": ("boiler fan panel pipe pump thermostat valve", ""),
+    "maintenance_leak": ("pipe", ""),
+    "security_patrol": (f"{ROOMS} door garage stair_room technical utility waste_room", "stall_door parking"),
+    "waste_collection": ("waste_receptacle waste_room", ""),
+}
+
+
+@cache
+def labels() -> dict[str, dict[str, set[str]]]:
+    """Return the labels of each element, by model."""
+    found: dict[str, dict[str, set[str]]] = defaultdict(dict)
+    with LABELS.open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            found[row["model"]][row["global_id"]] = set(row["label"].split())
+    return dict(found)
+
+
+@cache
+def building(model: str) -> Building:
+    return bn.read_ifc(real_model(model))
+
+
+def found_by(task: str, model: str) -> set[str]:
+    rules = bn.load_task(task).targets
+    return {hit.element.global_id for rule in rules for hit in match(rule, building(model))}
+
+
+@cache
+def outcomes(task: str) -> Counter[str]:
+    """Count hits, misses and false alarms of a task over all labelled elements."""
+    wanted, either = (set(text.split()) for text in WANTED[task])
+    counts: Counter[str] = Counter()
+    for model, known in labels().items():
+        found = found_by(task, model)
+        for global_id, label in known.items():
+            if label & either:
+                continue
+            is_wanted, is_found = bool(label & wanted), global_id in found
+            counts["hit" if is_wanted and is_found else "miss" if is_wanted else "alarm" if is_found else "rest"] += 1
+    return counts
+
+
+def test_every_task_of_the_library_is_judged_here():
+    assert set(WANTED) == {task.name for task in bn.list_tasks()}
+
+
+def test_the_labels_are_many_and_of_elements_that_exist():
+    assert sum(map(len, labels().values())) > 1500
+    for model, known in labels().items():
+        there = {product.global_id for product in (*building(model).elements, *building(model).spaces)}
+        assert set(known) <= there, model
+
+
+@pytest.mark.parametrize("task", WANTED)
+def test_a_task_finds_what_is_labelled_so_and_hardly_anything_else(task):
+    counts = outcomes(task)
+    assert counts["alarm"] <= 0.02 * (counts["hit"] + counts["alarm"])  # precision of 0.98
+    assert counts["hit"] >= 0.95 * (counts["hit"] + counts["miss"])  # recall
+
+
+def test_over_all_tasks_precision_and_recall_are_higher_still():
+    counts = sum((outcomes(task) for task in WANTED), Counter())
+    assert counts["hit"] / (counts["hit"] + counts["alarm"]) > 0.99
+    assert counts["hit"] / (counts["hit"] + counts["miss"]) > 0.99
+
+
+# names as exporters write them: class, name, type name; and what the task is to make of them
+HITS = [
+    ("inspection_mep", "IfcFlowController", "Gate Valve - 50-300 mm:100 mm:391", ""),
+    ("inspection_mep", "IfcPipeFitting", "Heizungsarmatur", "Absperrventil DN20"),
+    ("inspection_mep", "IfcFlowController", "Klappe", "Rückschlagklappe DN50"),
+    ("inspection_mep", "IfcDistributionElement", "Шаровой кран DN15", ""),
+    ("inspection_mep", "IfcDistributionElement", "Клапаны балансировочные", ""),
+    ("inspection_mep", "IfcDistributionElement", "闸阀-DN100", ""),
+    ("inspection_mep", "IfcDistributionElement", "Umwälzpumpe", ""),
+    ("inspection_mep", "IfcDistributionElement", "M_Base Mounted Pump:50 LPS:12", ""),
+    ("inspection_mep", "IfcBuildingElementProxy", "Pompe de circulation", ""),
+    ("inspection_mep", "IfcDistributionElement", "Cirkulationspump CP1", ""),
+    ("inspection_mep", "IfcDistributionElement", "Gasbrennwertkessel 24 kW", ""),
+    ("inspection_mep", "IfcDistributionElement", "Wärmepumpe", ""),
+    ("inspection_mep", "IfcDistributionElement", "Calentador de agua:Caldera mural:2", ""),
+    ("inspection_mep", "IfcDistributionElement", "Brandschutzklappe FK90", ""),
+    ("inspection_mep", "IfcDistributionElement", "Spjäll: brandspjäll 200", ""),
+    ("inspection_mep", "IfcDistributionElement", "防火阀:500x300", ""),
+    ("inspection_mep", "IfcDistributionElement", "Unterverteilung UV-EG", ""),
+    ("inspection_mep", "IfcDistributionElement", "Tableau électrique:T1", ""),
+    ("inspection_mep", "IfcDistributionElement", "Щит распределительный ЩР-1", ""),
+    ("inspection_mep", "IfcDistributionElement", "Raumtemperaturfühler", ""),
+    ("inspection_mep", "IfcDistributionElement", "Датчик температуры", ""),
+    ("inspection_mep", "IfcFlowSegment", "Pipe Types:Copper - Type L:3312", ""),
+    ("inspection_mep", "IfcFlowSegment", "Kupferrohr 22x1", ""),
+    ("inspection_fire", "IfcBuildingElementProxy", "Fire Extinguisher:6 kg:991", ""),
+    ("inspection_fire", "IfcFurnishingElement", "Pulverfeuerlöscher", ""),
+    ("inspection_fire", "IfcBuildingElementProxy", "Brandblusser 6L", ""),
+    ("inspection_fire", "IfcBuildingElementProxy", "Extintor portátil", ""),
+    ("inspection_fire", "IfcBuildingElementProxy", "Огнетушитель ОП-4", ""),
+    ("inspection_fire", "IfcBuildingElementProxy", "灭火器箱", ""),
+    ("inspection_fire", "IfcFlowTerminal", "Wandhydrant Typ F", ""),
+    ("inspection_fire", "IfcFlowTerminal", "室内消火栓", ""),
+    ("inspection_fire", "IfcDistributionElement", "Rauchmelder", ""),
+    ("inspection_fire", "IfcDistributionElement", "Manual Call Point:Red:3", ""),
+    ("inspection_fire", "IfcDistributionElement", "Détecteur de fumée", ""),
+    ("inspection_fire", "IfcDistributionElement", "Извещатель пожарный дымовой", ""),
+    ("inspection_fire", "IfcLightFixture", "Exit Sign - Wall:Single Face:8", ""),
+    ("inspection_fire", "IfcLightFixture", "Rettungszeichenleuchte", ""),
+    ("inspection_fire", "IfcLightFixture", "誘導灯 C級", ""),
+    ("inspection_fire", "IfcDoor", "Innentür", "Brandschutztür T30 RS"),
+    ("inspection_fire", "IfcDoor", "防火门FM甲:1200x2100", ""),
+    ("waste_collection", "IfcFurniture", "Trash Can:Round:9", ""),
+    ("waste_collection", "IfcFurniture", "Papierkorb", ""),
+    ("waste_collection", "IfcFurniture", "Treteimer", ""),
+    ("waste_collection", "IfcFurniture", "Cubo de basura", ""),
+    ("waste_collection", "IfcFurniture", "Контейнер для мусора", ""),
+    ("waste_collection", "IfcFurniture", "分類垃圾桶", ""),
+    ("waste_collection", "IfcSpace", "Müllraum", ""),
+    ("disinfection", "IfcElectricAppliance", "Lichtschalter", ""),
+    ("disinfection", "IfcFlowTerminal", "Einhebelmischer Waschtisch", ""),
+    ("disinfection", "IfcFurniture", "Schreibtisch 160x80", ""),
+    ("disinfection", "IfcFurniture", "ruokapöytä", ""),
+    ("disinfection", "IfcBuildingElementProxy", "Handrail:Wall Mounted:5", ""),
+    ("cleaning_rooms", "IfcSpace", "C-101", ""),
+    ("cleaning_rooms", "IfcSpace", "WC Herren", ""),
+    ("delivery", "IfcSpace", "Großraumbüro 2", ""),
+    ("security_patrol", "IfcSpace", "Serverraum", ""),
+    ("maintenance_leak", "IfcFlowSegment", "Tubería de cobre:22mm", ""),
+    ("emergency_egress", "IfcDoor", "Notausgangstür", ""),
+]
+MISSES = [
+    ("inspection_mep", "IfcFlowTerminal", "Urinal-Wall-3D:19 mm Flush Valve:4", ""),
+    ("inspection_mep", "IfcFlowFitting", "Armatur/Flansch/Dichtung M_600", "Vorschweissflansch PN16"),
+    ("inspection_mep", "IfcPlate", "System Panel:Glazed:3", ""),
+    ("inspection_mep", "IfcBuildingElementProxy", "Whiteboard Panel", ""),
+    ("inspection_mep", "IfcDistributionElement", "Fire Alarm Control Panel", ""),
+    ("inspection_mep", "IfcDistributionElement", "Rauchmelder mit Sensor", ""),
+    ("inspection_mep", "IfcLightFixture", "Leuchte mit Bewegungssensor", ""),
+    ("inspection_mep", "IfcFurniture", "Wasserkocher", ""),
+    ("inspection_mep", "IfcSpace", "Boiler Room", ""),
+    ("inspection_mep", "IfcFlowSegment", "Rectangular Duct:Mitered:4", ""),
+    ("inspection_mep", "IfcFlowSegment", "Conduit Pipe:EMT:4", ""),
+    ("inspection_mep", "IfcRailing", "Railing:900mm Pipe:3", ""),
+    ("inspection_mep", "IfcFlowTerminal", "Soap Pump Dispenser", ""),
+    ("inspection_mep", "IfcCovering", "Fan Coil Ceiling", ""),
+    ("inspection_fire", "IfcBuildingElementProxy", "Fire Extinguisher Sign:A5:7", ""),
+    ("inspection_fire", "IfcWall", "Interior - Fire Rated 2-HR", ""),
+    ("inspection_fire", "IfcDistributionElement", "Fireplace - Wood Burning", ""),
+    ("inspection_fire", "IfcDoor", "M_Single-Flush:0915 x 2134mm:1", ""),
+    ("inspection_fire", "IfcWindow", "Fire Rated Window", ""),
+    ("inspection_fire", "IfcSpace", "Fire Alarm Room", ""),
+    ("inspection_fire", "IfcDistributionElement", "Bewegungsmelder", ""),
+    ("waste_collection", "IfcFlowTerminal", "Duplex Receptacle:Standard:3", ""),
+    ("waste_collection", "IfcBuildingElementProxy", "Banana Peel:Banana Peel:3", ""),
+    ("waste_collection", "IfcFlowTerminal", "Waste Water Terminal", ""),
+    ("waste_collection", "IfcFurniture", "Storage Bin Shelf", ""),
+    ("waste_collection", "IfcMember", "Rectangular Mullion:50x150:3", ""),
+    ("disinfection", "IfcElectricAppliance", "Network Switch 24 Port", ""),
+    ("disinfection", "IfcLightFixture", "Table Lamp", ""),
+    ("disinfection", "IfcFurniture", "Desk Chair", ""),
+    ("disinfection", "IfcBuildingElementProxy", "Twin Switched Socket Outlet:Standard:1", ""),
+    ("disinfection", "IfcSpace", "Table Tennis", ""),
+    ("cleaning_rooms", "IfcSpace", "Roof", ""),
+    ("cleaning_rooms", "IfcSpace", "Aufzugsschacht", ""),
+    ("cleaning_rooms", "IfcSpace", "Treppenhaus 1", ""),
+    ("cleaning_rooms", "IfcSpace", "Tiefgarage", ""),
+    ("cleaning_rooms", "IfcSpace", "ELEC RM", ""),
+    ("cleaning_rooms", "IfcSpace", "Щитовая", ""),
+    ("delivery", "IfcSpace", "MENS RR", ""),
+    ("security_patrol", "IfcSpace", "Dachterrasse", ""),
+    ("security_patrol", "IfcDoor", "M_Toilet Partition:0915 x 1525mm:4", ""),
+    ("maintenance_leak", "IfcFlowSegment", "Kabelleerrohr M25", ""),
+    ("emergency_egress", "IfcDoor", "Innentür", ""),
+    ("emergency_egress", "IfcWindow", "Notausstieg Fenster", ""),
+]
+ABOVE = {  # what the schema says is one of these
+    "IfcElectricAppliance": ("IfcFlowTerminal", "IfcDistributionElement"),
+    "IfcFlowController": ("IfcDistributionElement",),
+    "IfcFlowFitting": ("IfcDistributionElement",),
+    "IfcFlowSegment": ("IfcDistributionElement",),
+    "IfcFlowTerminal": ("IfcDistributionElement",),
+    "IfcFurniture": ("IfcFurnishingElement",),
+    "IfcLightFixture": ("IfcFlowTerminal", "IfcDistributionElement"),
+    "IfcPipeFitting": ("IfcFlowFitting", "IfcDistributionElement"),
+}
+
+
+def one(ifc_class: str, name: str, type_name: str) -> Building:
+    """Return a building of one element or room."""
+    if ifc_class == "IfcSpace":
+        rooms, elements = (Space("0", "1", name),), ()
+    else:
+        rooms, elements = (), (Element("0", ifc_class, name, type_name),)
+
+    def selector(query: str) -> list[str]:
+        facets = [facet.strip() for part in query.split("+") for facet in part.split(",")]
+        known = {"IfcElement", ifc_class, *ABOVE.get(ifc_class, ())} - ({"IfcElement"} if rooms else set())
+        excluded = {facet.removeprefix("!").strip() for facet in facets if facet.startswith("!")}
+        return ["0"] if known & set(facets) and not known & excluded else []
+
+    return Building("by hand", (Storey("s", "G", 0.0),), spaces=rooms, elements=elements, selector=selector)
+
+
+@pytest.mark.parametrize("case", HITS, ids=lambda case: f"{case[0]}: {case[2]}")
+def test_a_task_knows_its_targets_in_many_languages(case):
+    task, *thing = case
+    assert any(match(rule, one(*thing)) for rule in bn.load_task(task).targets)
+
+
+@pytest.mark.parametrize("case", MISSES, ids=lambda case: f"{case[0]}: {case[2]}")
+def test_a_task_is_not_misled_by_words(case):
+    task, *thing = case
+    rules = [rule for rule in bn.load_task(task).targets if "PredefinedType" not in rule.filter]
+    assert not [hit.why for rule in rules for hit in match(rule, one(*thing))]
