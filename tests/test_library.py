@@ -18,7 +18,8 @@ LABELS = Path(__file__).with_name("labels.csv")
 
 # Each label is what someone who reads the element's names, type, properties and geometry would call it.
 ROOMS = (
-    "bedroom break_room classroom corridor gallery hall_room kitchen living medical meeting office reception room storage"
+    "bedroom break_room classroom corridor gallery hall_room kitchen living medical meeting "
+    "office reception room storage"
 )
 # a task, the labels that it is to find, and those of which reasonable people may say either
 WANTED = {

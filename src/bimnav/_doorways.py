@@ -185,7 +185,9 @@ class _Ground:
         for side in (-1, 1):
             points = [way.center + side * (way.depth / 2 + step) * way.across for step in (*_SIDESTEPS, *_BEYOND)]
             over = [k for k in near for p in points if (low[k, :2] <= p).all() and (p <= high[k, :2]).all()]
-            if not any(_heights_at(s, p) for k in dict.fromkeys(over) for s in self._products[k].shapes for p in points):
+            if not any(
+                _heights_at(s, p) for k in dict.fromkeys(over) for s in self._products[k].shapes for p in points
+            ):
                 return True
         return False
 
