@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
@@ -24,16 +24,29 @@ from bimnav.errors import (
 )
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
+from bimnav.smooth import straighten, turns_of
 
 if TYPE_CHECKING:
     import rustworkx
 
     from bimnav.links import Link
 
-__all__ = ["Algorithm", "Engine", "Path", "distance_field", "distance_matrix", "find_path", "free_index"]
+__all__ = [
+    "Algorithm",
+    "Engine",
+    "Path",
+    "Smooth",
+    "check_smooth",
+    "distance_field",
+    "distance_matrix",
+    "find_path",
+    "free_index",
+    "smooth_path",
+]
 
 Algorithm = Literal["auto", "astar", "dijkstra"]
 Engine = Literal["compiled", "rustworkx"]
+Smooth = Literal["any_angle"]
 
 _PROVED = 1e-9  # relative; a smaller gap is rounding
 
@@ -54,15 +67,21 @@ class Path:
     cost
         What was made least: every step's length times the mean of its cells' multipliers, and what the
         connectors cost; metres, or seconds or joules if that is the graph's objective.
+    legs : (n, 3) float64 or None
+        Points between which the path was drawn straight, metres; then `length` and `cost` are theirs, and
+        the cells are those of the path they were drawn from.
     """
 
     graph: NavGraph
     indices: NDArray[np.int32]
     length: float
     cost: float
+    legs: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         self.indices.flags.writeable = False
+        if self.legs is not None:
+            self.legs.flags.writeable = False
 
     def __repr__(self) -> str:
         start, goal = (Cell(*self.indices[k].tolist()) for k in (0, -1))
@@ -91,6 +110,15 @@ class Path:
         points.flags.writeable = False
         return points
 
+    @cached_property
+    def waypoints(self) -> NDArray[np.float64]:
+        """(n, 3) float64, where the path begins, turns and ends in world coordinates, metres."""
+        if self.legs is not None:
+            return self.legs
+        points = _along(self, [self.graph.frame.centers_of(turns_of(part)) for part in _stretches(self)])
+        points.flags.writeable = False
+        return points
+
 
 def find_path(
     graph: NavGraph,
@@ -99,6 +127,7 @@ def find_path(
     *,
     algorithm: Algorithm = "auto",
     engine: Engine = "compiled",
+    smooth: Smooth | None = None,
 ) -> Path:
     """Find a cheapest path.
 
@@ -116,6 +145,8 @@ def find_path(
     engine
         `compiled` searches the arrays; `rustworkx` searches the graph written out, hundreds of times
         slower: a second opinion. Which of several cheapest paths they return may differ.
+    smooth
+        `any_angle` draws the path straight, see `smooth_path`.
 
     Returns
     -------
@@ -135,16 +166,65 @@ def find_path(
         raise ValueRangeError(f"algorithm is {algorithm!r}.", "Give 'auto', 'astar' or 'dijkstra'.")
     if engine not in ("compiled", "rustworkx"):
         raise ValueRangeError(f"engine is {engine!r}.", "Give 'compiled' or 'rustworkx'.")
+    check_smooth(smooth)
     begin = free_index(graph, start, "start")
     end = free_index(graph, goal, "goal")
     if engine == "rustworkx":
-        return _find_explicit(graph, begin, end, algorithm)
-    found = search.find(_layout(graph), begin, end, algorithm)
-    if found is None:
-        raise _no_path(graph, begin, end)
-    d = graph.frame.cell_size
-    length = _length(graph, found.indices) if graph.connectors else found.length * d
-    return Path(graph, found.indices, length, found.cost * d * graph.unit_cost)
+        path = _find_explicit(graph, begin, end, algorithm)
+    else:
+        found = search.find(_layout(graph), begin, end, algorithm)
+        if found is None:
+            raise _no_path(graph, begin, end)
+        d = graph.frame.cell_size
+        length = _length(graph, found.indices) if graph.connectors else found.length * d
+        path = Path(graph, found.indices, length, found.cost * d * graph.unit_cost)
+    return smooth_path(path) if smooth else path
+
+
+def check_smooth(smooth: Smooth | None) -> None:
+    """Refuse a way of smoothing that there is not."""
+    if smooth not in (None, "any_angle"):
+        raise ValueRangeError(f"smooth is {smooth!r}.", "Give 'any_angle' or None.")
+
+
+def smooth_path(
+    path: Path, begin: tuple[float, float, float] | None = None, end: tuple[float, float, float] | None = None
+) -> Path:
+    """Draw a path straight: legs at any angle that never leave free space.
+
+    Between links, where all floor costs the same, the legs are a shortest path for the robot's middle: past
+    the exact shapes of an environment, grown by the robot's radius, or past the blocked cells of a mask, whose
+    sides and corners may be touched. Where cells have multipliers, turns are left out while that saves cost.
+    Every leg is checked against the exact shapes; where one fails the path over cells stays.
+
+    Parameters
+    ----------
+    path
+        As found over cells.
+    begin, end
+        Exact points in the first and the last cell, metres; the middles of the cells if not given.
+    """
+    graph, stretches = path.graph, _stretches(path)
+    straight = [
+        straighten(graph, part, begin if k == 0 else None, end if k == len(stretches) - 1 else None)
+        for k, part in enumerate(stretches)
+    ]
+    length, cost = (math.fsum(part[k] for part in straight) for k in (1, 2))
+    length += math.fsum(link.length for _, link in path.rides)
+    cost = cost * graph.unit_cost + math.fsum(graph.cost_of(link) for _, link in path.rides)
+    return replace(path, length=length, cost=cost, legs=_along(path, [part.points for part in straight]))
+
+
+def _stretches(path: Path) -> list[NDArray[np.int32]]:
+    """Return the parts of a path that lie on one storey each."""
+    return np.split(path.indices, [k + 1 for k, _ in path.rides])
+
+
+def _along(path: Path, parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Join the points on each storey by the ways over the connectors between them."""
+    for n, (k, link) in enumerate(path.rides):
+        parts[n] = np.vstack([parts[n], link.points_from(Cell(*path.indices[k].tolist()))[1:-1]])
+    return np.vstack(parts)
 
 
 def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[np.float64]:

@@ -17,8 +17,18 @@ from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 from bimnav.plan.charging import Charge, plan_charging
 from bimnav.plan.orders import gap_of, order_stops
-from bimnav.plan.paths import Algorithm, Path, distance_matrix, find_path, free_index
+from bimnav.plan.paths import (
+    Algorithm,
+    Path,
+    Smooth,
+    check_smooth,
+    distance_matrix,
+    find_path,
+    free_index,
+    smooth_path,
+)
 from bimnav.robot import Robot
+from bimnav.smooth import turns_of
 from bimnav.stops import Stand, Stop, Unreached
 
 __all__ = ["Tour", "find_chargers", "near_stands", "plan_tour", "seconds_at", "why_unreached"]
@@ -75,7 +85,7 @@ class Tour:
 
     @cached_property
     def length(self) -> float:
-        """Of all legs, along cells, metres."""
+        """Of all legs, metres: along cells, or along straight legs where they were drawn."""
         return math.fsum(leg.length for leg in self.legs)
 
     @cached_property
@@ -101,8 +111,8 @@ class Tour:
     def route(self) -> tuple[NDArray[np.float64], ...]:
         """What the robot drives: for each leg an (n, 3) polyline in metres, from exact point to exact point.
 
-        It passes the middles of the cells where it turns. A cell that is reached although it is blocked
-        is entered straight to its stop, and left likewise.
+        It passes the middles of the cells where it turns, or goes along straight legs. A cell that is
+        reached although it is blocked is entered straight to its stop, and left likewise.
         """
         ends = [stop.end for stop in self.stops]
         blocked = [stop.approach == "reach" for stop in self.stops]
@@ -122,6 +132,7 @@ def plan_tour(
     stops: Iterable[Stop] | None = None,
     *,
     algorithm: Algorithm = "auto",
+    smooth: Smooth | None = None,
     return_to_start: bool = False,
     end: Cell | None = None,
     start_point: Point | None = None,
@@ -144,6 +155,9 @@ def plan_tour(
         What to visit; None for every target of the graph. Several may share a cell.
     algorithm
         As in `find_path`, for the legs.
+    smooth
+        `any_angle` draws the legs straight, from exact point to exact point; their order stays that of the
+        paths over cells.
     return_to_start
         Whether to come back in the end.
     end
@@ -171,6 +185,7 @@ def plan_tour(
     InputError
         If the tour should both end elsewhere and return.
     """
+    check_smooth(smooth)
     free_index(graph, start, "start")
     if end is not None:
         if return_to_start and end != start:
@@ -210,10 +225,12 @@ def plan_tour(
         return_to_start,
         end,
     )
-    return _driven(planned, robot, chargers, algorithm)
+    return _driven(planned, robot, chargers, algorithm, smooth)
 
 
-def _driven(tour: Tour, robot: Robot, chargers: Iterable[Stop] | None, algorithm: Algorithm) -> Tour:
+def _driven(
+    tour: Tour, robot: Robot, chargers: Iterable[Stop] | None, algorithm: Algorithm, smooth: Smooth | None
+) -> Tour:
     """Return a tour with visits to chargers where the battery needs them, and with its legs."""
     graph, start, visits = tour.graph, tour.start, tour.stops
     goal = start if tour.return_to_start else tour.end
@@ -228,6 +245,9 @@ def _driven(tour: Tour, robot: Robot, chargers: Iterable[Stop] | None, algorithm
     if goal is not None and (visits or tour.end is not None):
         cells.append(goal)
     legs = tuple(find_path(graph, a, b, algorithm=algorithm) for a, b in pairwise(cells))
+    if smooth:
+        ends = [tour.start_point, *(None if stop.approach == "reach" else stop.end for stop in visits), None]
+        legs = tuple(smooth_path(leg, ends[k], ends[k + 1]) for k, leg in enumerate(legs))
     is_optimal = tour.is_optimal and not charges
     return replace(tour, stops=visits, legs=legs, unreached=tuple(unreached), is_optimal=is_optimal, charges=charges)
 
@@ -375,13 +395,17 @@ def _polyline(
     skip_first: bool,
     skip_last: bool,
 ) -> NDArray[np.float64]:
-    first, last = (int(skip_first), len(leg.indices) - skip_last) if len(leg.indices) > 1 else (0, 0)
     parts: list[NDArray[np.float64]] = [np.array([begin])]
-    for k, link in leg.rides:
-        parts.append(_turns(leg, first, k + 1))
-        parts.append(link.points_from(Cell(*leg.indices[k].tolist()))[1:-1])
-        first = k + 1
-    points: NDArray[np.float64] = np.vstack([*parts, _turns(leg, first, last), np.array([end])])
+    if leg.legs is not None:
+        parts.append(leg.legs[skip_first : len(leg.legs) - skip_last])
+    else:
+        first, last = (int(skip_first), len(leg.indices) - skip_last) if len(leg.indices) > 1 else (0, 0)
+        for k, link in leg.rides:
+            parts.append(_turns(leg, first, k + 1))
+            parts.append(link.points_from(Cell(*leg.indices[k].tolist()))[1:-1])
+            first = k + 1
+        parts.append(_turns(leg, first, last))
+    points: NDArray[np.float64] = np.vstack([*parts, np.array([end])])
     moved = np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME_POINT
     points = points[np.concatenate([[True], moved])]
     points[-1] = end
@@ -391,9 +415,4 @@ def _polyline(
 
 def _turns(leg: Path, first: int, last: int) -> NDArray[np.float64]:
     """Return the middles of the cells between two numbers where a leg begins, turns and ends, (n, 3) metres."""
-    indices = leg.indices[first:last]
-    if len(indices) > 2:
-        steps = np.diff(indices, axis=0)
-        turns = (steps[1:] != steps[:-1]).any(axis=1)
-        indices = indices[np.concatenate([[True], turns, [True]])]
-    return leg.graph.frame.centers_of(indices)
+    return leg.graph.frame.centers_of(turns_of(leg.indices[first:last]))

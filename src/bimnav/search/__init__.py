@@ -4,22 +4,33 @@ from bimnav.search.components import components
 from bimnav.search.engine import Found, distances, distances_between, find
 from bimnav.search.exact import share_out, trace_visits, visit_table
 from bimnav.search.layout import Layout
+from bimnav.search.mesh import Mesh, mesh_of_mask, mesh_of_triangles
 from bimnav.search.ordering import Ordering, is_small, order_few, order_groups, order_rows
+from bimnav.search.sight import along, dearest, shorten
+from bimnav.search.taut import Taut, find_taut
 from bimnav.search.warmup import warmup
 
 __all__ = [
     "Found",
     "Layout",
+    "Mesh",
     "Ordering",
+    "Taut",
+    "along",
     "components",
+    "dearest",
     "distances",
     "distances_between",
     "find",
+    "find_taut",
     "is_small",
+    "mesh_of_mask",
+    "mesh_of_triangles",
     "order_few",
     "order_groups",
     "order_rows",
     "share_out",
+    "shorten",
     "trace_visits",
     "visit_table",
     "warmup",

@@ -7,7 +7,10 @@ import numpy as np
 from bimnav.search.components import components
 from bimnav.search.engine import distances, distances_between, find
 from bimnav.search.layout import Layout
+from bimnav.search.mesh import mesh_of_mask
 from bimnav.search.ordering import EXACT, order_rows
+from bimnav.search.sight import along, dearest, shorten
+from bimnav.search.taut import find_taut
 
 __all__ = ["warmup"]
 
@@ -17,6 +20,12 @@ def warmup() -> None:
     cost = np.ones((1, 3, 3), dtype=np.float32)
     cells = np.array([0, 8])
     components(cost > 0)
+    mesh, face = mesh_of_mask(np.eye(3) < 1)
+    find_taut(mesh, (0.5, 2.5), int(face[2, 0]), (2.5, 0.5), int(face[0, 2]))
+    line = np.array([[0.5, 0.5], [2.5, 0.5], [2.5, 2.5]])
+    shorten(cost[0], line)
+    along(cost[0], 0.5, 0.5, 2.5, 2.5)
+    dearest(cost[0], 0.5, 0.5, 2.5, 2.5)
     for multipliers in (cost, cost + np.arange(3).astype(np.float32)):
         layout = Layout(multipliers)
         find(layout, 0, 8)
