@@ -281,6 +281,23 @@ class NavGraph:
         cost = np.broadcast_to(np.asarray(factor, dtype=np.float32), self.frame.shape)
         return replace(self, cost=np.where(self.free, cost, np.float32(np.inf)))
 
+    def with_clearance(self, metres: float, weight: float = 4.0) -> Self:
+        """Return the graph with cells dearer the nearer they lie to blocked ones, so that paths keep away.
+
+        Only the cost changes: where there is no other way, a path goes through all the same. What the
+        robot must keep away from at all costs is its radius. Cells that are closed later repel nothing.
+
+        Parameters
+        ----------
+        metres
+            Distance, from the middle of a cell to the nearest blocked one, from which on nothing is added.
+        weight
+            Added to the multiplier right beside an obstacle; it falls with the square of the distance missing.
+        """
+        from bimnav._clearance import clearance_factors
+
+        return replace(self, cost=self.cost * clearance_factors(self.free, self.frame.cell_size, metres, weight))
+
     def with_objective(self, objective: Objective) -> Self:
         """Return the graph whose paths make something else least."""
         return self if objective == self.objective else replace(self, objective=objective)
@@ -367,6 +384,7 @@ def build_graph(
     refine: Literal["auto"] | None = None,
     on_conflict: Literal["approach", "reach"] = "approach",
     objective: Objective = "distance",
+    clearance: float = 0.0,
 ) -> NavGraph:
     """Cut an environment into cells, and join its storeys by the connectors its robot can use.
 
@@ -385,6 +403,8 @@ def build_graph(
         kept reachable, as in the paper.
     objective
         What paths make least: `distance`, `time` or `energy`.
+    clearance
+        Distance from obstacles that paths prefer, metres, beyond the robot's radius; `with_clearance`.
 
     Raises
     ------
@@ -404,7 +424,8 @@ def build_graph(
     for array in (cost, obstacle, floor):
         _frozen(array)
     connectors, refused = join_connectors(environment, frame, np.isfinite(cost))
-    return NavGraph(
+    graph = NavGraph(
         frame, cost, obstacle, floor, connectivity, environment, targets, conflicts, on_conflict, connectors, refused,
         objective,
     )  # fmt: skip
+    return graph.with_clearance(clearance) if clearance else graph

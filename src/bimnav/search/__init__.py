@@ -8,6 +8,7 @@ from bimnav.search.mesh import Mesh, mesh_of_mask, mesh_of_triangles
 from bimnav.search.ordering import Ordering, is_small, order_few, order_groups, order_rows
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import Taut, find_taut
+from bimnav.search.transform import clearances
 from bimnav.search.warmup import warmup
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "Ordering",
     "Taut",
     "along",
+    "clearances",
     "components",
     "dearest",
     "distances",

@@ -11,6 +11,7 @@ from bimnav.search.mesh import mesh_of_mask
 from bimnav.search.ordering import EXACT, order_rows
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import find_taut
+from bimnav.search.transform import clearances
 
 __all__ = ["warmup"]
 
@@ -20,6 +21,7 @@ def warmup() -> None:
     cost = np.ones((1, 3, 3), dtype=np.float32)
     cells = np.array([0, 8])
     components(cost > 0)
+    clearances(cost > 0)
     mesh, face = mesh_of_mask(np.eye(3) < 1)
     find_taut(mesh, (0.5, 2.5), int(face[2, 0]), (2.5, 0.5), int(face[0, 2]))
     line = np.array([[0.5, 0.5], [2.5, 0.5], [2.5, 2.5]])
