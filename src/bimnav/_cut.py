@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from bimnav.grid import EROSION, Cell, GridFrame, cells_within, rasterize
 if TYPE_CHECKING:
     from bimnav.environment import IndoorEnvironment, Target
 
-__all__ = ["FINEST", "Conflict", "Cut", "conflict_at", "cut"]
+__all__ = ["FINEST", "Conflict", "Cut", "conflict_at", "cut", "zone_factor"]
 
 FINEST = 0.01
 """Edge in metres of the smallest cells that `refine` tries."""
@@ -79,13 +79,22 @@ def cut(environment: IndoorEnvironment, cell_size: float, on_conflict: Literal["
             if zone.storey == storey:
                 touched = rasterize(frame, zone.polygon)
                 cost[storey][touched] = np.maximum(cost[storey][touched], np.float32(zone.factor))
-    cost[obstacle | ~walkable] = np.inf
     targets = tuple(_targets_in(frame, environment))
     conflicts = tuple(conflict_at(frame, environment, target, cell) for target, cell in targets if obstacle[cell])
+    reached = tuple(np.array([conflict.cell for conflict in conflicts], dtype=int).reshape(-1, 3).T)
+    kept = cost[reached]
+    cost[obstacle | ~walkable] = np.inf
     if on_conflict == "reach":
-        for conflict in conflicts:
-            cost[conflict.cell] = 1
+        cost[reached] = kept
     return Cut(frame, cost, obstacle, walkable, targets, conflicts)
+
+
+def zone_factor(frame: GridFrame, environment: IndoorEnvironment, cell: Cell) -> float:
+    """Return the multiplier that the zones give to a cell."""
+    storey, row, col = cell
+    alone = replace(frame, first_row=frame.first_row + row, first_col=frame.first_col + col, rows=1, cols=1)
+    zones = (zone for zone in environment.zones if zone.storey == storey)
+    return max((zone.factor for zone in zones if rasterize(alone, zone.polygon).any()), default=1.0)
 
 
 def _targets_in(frame: GridFrame, environment: IndoorEnvironment) -> Iterable[tuple[Target, Cell]]:

@@ -407,7 +407,7 @@ class Detection:
     def global_id(self) -> str:
         """A GlobalId derived from name and position: the same target has the same id in every run."""
         text = f"{self.name}\0{self.x!r}\0{self.y!r}\0{self.storey!r}\0{self.z!r}"
-        return _compressed(hashlib.sha256(text.encode()).digest()[:16])
+        return global_id_of(text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -452,6 +452,11 @@ class Facts:
 
 
 _GLOBAL_ID_DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
+
+
+def global_id_of(text: str) -> str:
+    """Derive a GlobalId from a text: the same text has the same id in every run."""
+    return _compressed(hashlib.sha256(text.encode()).digest()[:16])
 
 
 def _compressed(sixteen_bytes: bytes) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
 
 import shapely
 
@@ -257,6 +257,16 @@ class IndoorEnvironment:
         within = [s for s in storeys if any(body.intersects(point) for _, body in self.bodies_on(s))]
         walkable = [s for s in (self.ground, *storeys) if s in storeys and not self.floor(s).is_empty]
         return tuple(dict.fromkeys([*on, *within, *walkable, *storeys]))
+
+    def with_obstacles(self, added: Iterable[Obstacle] = (), removed: Iterable[Obstacle] = ()) -> Self:
+        """Return the environment with other obstacles; floors and grown footprints are shared."""
+        added, gone = tuple(added), {id(obstacle) for obstacle in removed}
+        bodies = [tuple(pair for pair in level if id(pair[0]) not in gone) for level in self._bodies]
+        for obstacle in added:
+            bodies[obstacle.storey] += ((obstacle, grown(obstacle.footprint, self.robot.radius)),)
+        changed = replace(self, obstacles=(*(o for o in self.obstacles if id(o) not in gone), *added))
+        changed.__dict__.update(_floors=self._floors, _bodies=tuple(bodies))
+        return changed
 
     def is_clear(self, storey: int, *points: Sequence[float]) -> bool:
         """Tell whether the robot can be on a point, or drive straight from point to point, touching nothing."""

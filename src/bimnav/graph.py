@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, get_args
@@ -16,17 +16,21 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from bimnav import search
-from bimnav._cut import FINEST, Conflict, cut
+from bimnav._changes import Changes, Placed, cells_under, changed_arrays, indexes_of
+from bimnav._cut import FINEST, Conflict, conflict_at, cut, zone_factor
 from bimnav._explicit import Edges, networkx_of, rustworkx_of
-from bimnav.errors import GridError, ValueRangeError
+from bimnav.building import global_id_of
+from bimnav.environment import Obstacle, grown
+from bimnav.errors import GeometryError, GridError, ModelError, ValueRangeError
 from bimnav.grid import Cell, GridFrame
-from bimnav.links import Link, RefusedConnector, join_connectors
+from bimnav.links import Link, RefusedConnector, is_near_connector, join_connectors
 from bimnav.robot import Robot
 from bimnav.stops import Stop, Unreached, standing_at, stop_at, why_not_served
 
 if TYPE_CHECKING:
     import networkx
     import rustworkx
+    from shapely.geometry.base import BaseGeometry
 
     from bimnav.environment import IndoorEnvironment, Target
 
@@ -75,6 +79,8 @@ class NavGraph:
     objective
         What a path makes least: `distance` in metres, `time` in seconds, or `energy` in joules; times the
         cells' multipliers.
+    changes
+        What was closed since the graph was built: by `block`, `with_obstacle` and `close_door`.
     """
 
     frame: GridFrame
@@ -89,6 +95,7 @@ class NavGraph:
     connectors: tuple[Link, ...] = ()
     refused_connectors: tuple[RefusedConnector, ...] = ()
     objective: Objective = "distance"
+    changes: Changes = field(default_factory=Changes)
 
     def __post_init__(self) -> None:
         if self.connectivity not in (4, 8):
@@ -263,12 +270,155 @@ class NavGraph:
 
     def block(self, cells: Iterable[Cell]) -> Self:
         """Return the graph with cells closed."""
-        cost, obstacle = self.cost.copy(), self.obstacle.copy()
+        return self._changed(blocked=np.union1d(self.changes.blocked, self._flat(cells)))
+
+    def unblock(self, cells: Iterable[Cell]) -> Self:
+        """Return the graph with cells open again that `block` had closed; nothing else opens."""
+        return self._changed(blocked=np.setdiff1d(self.changes.blocked, self._flat(cells)))
+
+    def with_obstacle(
+        self, polygon: BaseGeometry, storey: int | str = 0, *, global_id: str = "", name: str = "obstacle"
+    ) -> Self:
+        """Return the graph with something standing in the way, as if the model had it.
+
+        Parameters
+        ----------
+        polygon
+            Plan view in world coordinates, metres; not grown by the robot's radius.
+        storey
+            Index, name or GlobalId of a storey of the environment.
+        global_id
+            By which `without_obstacle` knows it; derived from place and form if not given.
+        """
+        if not polygon.is_valid or polygon.is_empty:
+            raise GeometryError(f"{name} has no valid plan view.", "Give a simple polygon in metres.")
+        index = self._storey(storey)
+        key = global_id or global_id_of(f"{polygon.normalize().wkt}\0{index}\0{name}")
+        return self._with_placed([(index, polygon)], key, name, "IfcBuildingElementProxy", "placed since")
+
+    def without_obstacle(self, global_id: str) -> Self:
+        """Return the graph without an obstacle that `with_obstacle` had placed, or with a closed door open."""
+        kept = tuple(entry for entry in self.changes.placed if entry.global_id != global_id)
+        if len(kept) == len(self.changes.placed):
+            raise ModelError(
+                f"nothing that was placed or closed since is called {global_id!r}.",
+                "See `graph.changes.placed`.",
+                {"global_id": global_id},
+            )
+        return self._changed(placed=kept)
+
+    def close_door(self, global_id: str) -> Self:
+        """Return the graph with a door of the building closed: its doorway is an obstacle.
+
+        Raises
+        ------
+        ModelError
+            If no floor leads through a door of this GlobalId.
+        """
+        if self._is_closed(global_id):
+            return self
+        environment = self.environment
+        doorways = [] if environment is None else environment.regions
+        ways = [(r.storey, r.polygon) for r in doorways if r.source == "door" and r.global_id == global_id]
+        if environment is None or not ways:
+            raise ModelError(
+                f"no floor leads through a door {global_id!r}.",
+                "`building.doors` lists the doors, `bimnav.doors_of` tells where they lead.",
+                {"global_id": global_id},
+            )
+        door = next(door for door in environment.building.doors if door.global_id == global_id)
+        return self._with_placed(ways, global_id, door.name, door.element.ifc_class, "closed door")
+
+    def open_door(self, global_id: str) -> Self:
+        """Return the graph with a door open that `close_door` had closed."""
+        return self.without_obstacle(global_id) if self._is_closed(global_id) else self
+
+    def _is_closed(self, global_id: str) -> bool:
+        return any(entry.global_id == global_id for entry in self.changes.placed)
+
+    def _with_placed(
+        self, polygons: Iterable[tuple[int, BaseGeometry]], global_id: str, name: str, ifc_class: str, rule: str
+    ) -> Self:
+        placed = []
+        for storey, polygon in polygons:
+            level, robot = self.frame.elevations[storey], self._robot
+            low, high = level + robot.low, level + robot.height
+            obstacle = Obstacle(global_id, name, ifc_class, storey, polygon, low, high, "exact", rule)
+            cells = cells_under(self.frame, storey, grown(polygon, robot.radius if self.environment else 0.0))
+            placed.append(Placed(obstacle, cells))
+        return self._changed(placed=(*self.changes.placed, *placed))
+
+    def _flat(self, cells: Iterable[Cell]) -> NDArray[np.int64]:
+        cells = list(cells)
         for cell in cells:
             if cell not in self.frame:
                 raise GridError(f"{cell} is not a cell of a frame of shape {self.frame.shape}.")
-            cost[cell], obstacle[cell] = np.inf, True
-        return replace(self, cost=cost, obstacle=obstacle)
+        return indexes_of(cells, self.frame)
+
+    def _storey(self, storey: int | str) -> int:
+        storeys = self.environment.storeys if self.environment else ()
+        names = (k for k, known in enumerate(storeys) if storey in (known.name, known.global_id))
+        index = storey if isinstance(storey, int) else next(names, -1)
+        if not 0 <= index < len(self.frame.elevations):
+            raise ValueRangeError(
+                f"storey is {storey!r}.", f"Give an index below {len(self.frame.elevations)} or a name."
+            )
+        return index
+
+    def _changed(self, *, blocked: NDArray[np.int64] | None = None, placed: tuple[Placed, ...] | None = None) -> Self:
+        """Return the graph with other things closed."""
+        before, environment = self.changes, self.environment
+        blocked = before.blocked if blocked is None else blocked
+        placed = before.placed if placed is None else placed
+        added = [entry.obstacle for entry in placed if entry not in before.placed]
+        removed = [entry.obstacle for entry in before.placed if entry not in placed]
+        if environment is not None and (added or removed):
+            environment = environment.with_obstacles(added, removed)
+        under = np.unique(np.concatenate([np.zeros(0, np.int64), *(entry.cells for entry in placed)]))
+        conflicts = self._conflicts_with(environment, under)
+        reached = [conflict.cell for conflict in conflicts] if self.on_conflict == "reach" else []
+        kept = np.intersect1d(under, indexes_of(reached, self.frame))
+        cost, obstacle, changes, cells = changed_arrays(self.cost, self.obstacle, before, blocked, placed, kept)
+        for cell in reached:  # one that no floor carries, as when it is cut
+            if environment is not None and not self.floor[cell] and indexes_of([cell], self.frame)[0] in kept:
+                cost[cell] = zone_factor(self.frame, environment, cell)
+        graph = replace(
+            self,
+            cost=_frozen(cost),
+            obstacle=_frozen(obstacle),
+            environment=environment,
+            conflicts=conflicts,
+            changes=changes,
+        )
+        return graph._rejoined(cells)
+
+    def _conflicts_with(self, environment: IndoorEnvironment | None, under: NDArray[np.int64]) -> tuple[Conflict, ...]:
+        """Return the targets on obstacle cells, now that obstacles placed since lie over some cells."""
+        before = self.changes
+        if environment is None or not (len(under) or before.placed):
+            return self.conflicts
+        flat = np.array([indexes_of([cell], self.frame)[0] for _, cell in self.targets], dtype=np.int64)
+        over = np.isin(flat, under)
+        was_over = np.isin(flat, np.concatenate([np.zeros(0, np.int64), *(entry.cells for entry in before.placed)]))
+        known = {(c.global_id, c.cell): c for c in self.conflicts}
+        conflicts = []
+        for (target, cell), now, then, index in zip(self.targets, over, was_over, flat.tolist(), strict=True):
+            if now or then:
+                place = np.searchsorted(before.cells, index)
+                recorded = place < len(before.cells) and before.cells[place] == index
+                own = bool(before.obstacle[place]) if recorded else bool(self.obstacle[cell])
+                if now or own:
+                    conflicts.append(conflict_at(self.frame, environment, target, cell))
+            elif (target.global_id, cell) in known:
+                conflicts.append(known[target.global_id, cell])
+        return tuple(conflicts)
+
+    def _rejoined(self, cells: NDArray[np.int64]) -> Self:
+        """Return the graph with its connectors joined anew if cells that changed lie near one."""
+        if self.environment is None or not is_near_connector(self.environment, self.frame, cells):
+            return self
+        connectors, refused = join_connectors(self.environment, self.frame, self.free, self.connectors)
+        return replace(self, connectors=connectors, refused_connectors=refused)
 
     def with_cost(self, factor: ArrayLike) -> Self:
         """Return the graph with other costs; what is blocked stays blocked.
@@ -278,8 +428,10 @@ class NavGraph:
         factor : anything that fits (storeys, rows, cols)
             Multiplier of the length of a step, at least 1; inf closes a cell.
         """
-        cost = np.broadcast_to(np.asarray(factor, dtype=np.float32), self.frame.shape)
-        return replace(self, cost=np.where(self.free, cost, np.float32(np.inf)))
+        given = np.broadcast_to(np.asarray(factor, dtype=np.float32), self.frame.shape)
+        cost = _frozen(np.where(self.free, given, np.float32(np.inf)))
+        graph = replace(self, cost=cost, changes=self.changes.with_cost(given))
+        return graph._rejoined(np.flatnonzero(self.free & ~graph.free))
 
     def with_clearance(self, metres: float, weight: float = 4.0) -> Self:
         """Return the graph with cells dearer the nearer they lie to blocked ones, so that paths keep away.

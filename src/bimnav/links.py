@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from bimnav.environment import IndoorEnvironment
     from bimnav.robot import Robot
 
-__all__ = ["ConnectorKind", "Link", "RefusedConnector", "join_connectors"]
+__all__ = ["ConnectorKind", "Link", "RefusedConnector", "is_near_connector", "join_connectors"]
 
 ConnectorKind: TypeAlias = Literal["stair", "ramp", "lift"]
 
@@ -112,17 +113,34 @@ class RefusedConnector:
     reason: str
 
 
+def is_near_connector(environment: IndoorEnvironment, frame: GridFrame, cells: NDArray[np.int64]) -> bool:
+    """Tell whether any of some cells, as flat indexes, matters to where a connector is joined."""
+    ascents = environment.building.ascents
+    if not ascents or not len(cells):
+        return False
+    points = frame.centers_of(np.column_stack(np.unravel_index(cells, frame.shape)))
+    ends = np.concatenate([ascent.line() for ascent in ascents if ascent.way] or [_NO_POINTS])[:, :2]
+    low, high = points[:, :2].min(axis=0) - _AROUND, points[:, :2].max(axis=0) + _AROUND
+    margin = 2 * frame.cell_size
+    return bool(((ends >= low - margin) & (ends <= high + margin)).all(axis=1).any())
+
+
 def join_connectors(
-    environment: IndoorEnvironment, frame: GridFrame, free: NDArray[np.bool_]
+    environment: IndoorEnvironment, frame: GridFrame, free: NDArray[np.bool_], known: Iterable[Link] = ()
 ) -> tuple[tuple[Link, ...], tuple[RefusedConnector, ...]]:
     """Join the connectors of a building to the cells at their ends.
 
     A connector is used if the robot can climb or ride it, if nothing stands in the way, and if at two of
     its levels there is a free cell within a metre of where one gets on, with a straight way to it.
+
+    Parameters
+    ----------
+    known
+        Links found before among other free cells; those that still hold are taken over.
     """
     links: list[Link] = []
     refused: list[RefusedConnector] = []
-    joints = _Joints(environment, frame, free)
+    joints = _Joints(environment, frame, free, known)
     for ascent in environment.building.ascents:
         found = _why_unfit(ascent, environment.robot) or joints.links_of(ascent)
         if isinstance(found, str):
@@ -159,13 +177,24 @@ def _why_unfit(ascent: Ascent, robot: Robot) -> str:
 class _Joints:
     """Where connectors meet the cells of a graph."""
 
-    def __init__(self, environment: IndoorEnvironment, frame: GridFrame, free: NDArray[np.bool_]) -> None:
+    def __init__(
+        self,
+        environment: IndoorEnvironment,
+        frame: GridFrame,
+        free: NDArray[np.bool_],
+        known: Iterable[Link],
+    ) -> None:
         self.environment, self.frame, self.free = environment, frame, free
         self.parts = {connector.global_id: connector.parts for connector in environment.building.connectors}
-        left_out = {global_id for global_id, _ in environment.left_out}
-        self.solids = [
+        self.known = {(link.global_id, link.begin, link.end): link for link in known}
+
+    @cached_property
+    def solids(self) -> list[tuple[Element, NDArray[np.float64]]]:
+        """What may stand in the way, with its box."""
+        left_out = {global_id for global_id, _ in self.environment.left_out}
+        return [
             (element, bounds)
-            for element in environment.building.elements
+            for element in self.environment.building.elements
             if element.global_id not in left_out and (bounds := element.bounds) is not None
         ]
 
@@ -178,8 +207,11 @@ class _Joints:
         links: list[Link] = []
         reasons: list[str] = []
         for way, begin, end in self._ways(ascent, reasons):
-            blocking = self._blocking(ascent, way, own)
-            if blocking:
+            known = self.known.get((ascent.global_id, begin, end))
+            blocking = [] if known else self._blocking(ascent, way, own)
+            if known:
+                links.append(known)
+            elif blocking:
                 names = ", ".join(f"{e.name or e.ifc_class} ({e.global_id})" for e in blocking[:3])
                 reasons.append(f"blocked by {names}")
             else:
