@@ -11,7 +11,7 @@ import pytest
 from bimnav._select import select_by_hand
 from bimnav.building import Building, Element, Facts, Space, Storey
 from bimnav.errors import FileMissingError, InputError, SelectorError
-from bimnav.ifc import read_ifc
+from bimnav.ifc import _query, _select, read_ifc
 from bimnav.ifc._federate import federate
 from tests.conftest import real_model
 from tests.ifc_text import box, model
@@ -202,10 +202,10 @@ def test_a_file_that_changed_or_went_is_not_asked(tmp_path: Path):
     changed, gone = (read_ifc(path, cache=False, isolate=False) for _ in range(2))
     path.write_text(model(box(200)))
     with pytest.raises(InputError, match="changed since it was read"):
-        changed.select("IfcWall")
+        changed.select("IfcWall, Name=Wall")
     path.unlink()
     with pytest.raises(FileMissingError, match="gone"):
-        gone.select("IfcWall")
+        gone.select("IfcWall, Name=Wall")
 
 
 def test_the_facts_of_products_are_read_from_files_of_several_exporters():
@@ -235,3 +235,26 @@ def test_several_models_tell_the_facts_of_one_product_together():
     facts = federate([duplex, handover]).facts(table)
     assert any(code.code.startswith("23-40 20 14 17 24") for code in facts.classifications)
     assert {*duplex.facts(table).properties, *handover.facts(table).properties} == set(facts.properties)
+
+
+@pytest.mark.parametrize("model_name", ["houses/SampleHouse4.ifc", "office/Office_A_20110811.ifc"])
+def test_a_query_for_classes_alone_is_answered_as_from_the_file(model_name, monkeypatch):
+    path = real_model(model_name)
+    quick, slow = read_ifc(path), read_ifc(path)
+    queries = (
+        "IfcElement",
+        "IfcWall, IfcFlowTerminal",
+        "IfcBuildingElementProxy, IfcFurniture, ! IfcFurnishingElement",
+        "! IfcWall",
+        "! IfcElement + IfcDoor",
+        "IfcWall, ! IfcWallStandardCase, IfcSlab + IfcSpace",
+        "IfcOpeningElement",
+        "IfcObject",
+    )
+    answers = [quick.select(query) for query in queries]
+    monkeypatch.setattr(_query, "of_classes", lambda *_: None)
+    for query, answer in zip(queries, answers, strict=True):
+        assert [e.global_id for e in slow.select(query)] == [e.global_id for e in answer], query
+    monkeypatch.undo()
+    monkeypatch.setattr(_select, "open_copy", None)
+    assert [e.global_id for e in read_ifc(path).select("IfcWall")] == [e.global_id for e in slow.select("IfcWall")]

@@ -762,7 +762,7 @@ def test_a_target_and_its_stop_carry_what_their_rule_asks():
 # tasks built on tasks, and folders of tasks
 
 
-def test_a_task_extends_another_its_rules_behind_and_its_keys_over_it(tmp_path):
+def test_a_task_extends_another_its_rules_and_keys_going_before(tmp_path):
     path = written(
         tmp_path,
         """schema = 1
@@ -778,10 +778,10 @@ words = ["carpet"]
 """,
     )
     base, night, later = load_task("cleaning"), load_task(path, "night"), load_task(path, "later")
-    assert night.targets == (*base.targets, Rule(words=("leaves",)))
+    assert night.targets == (Rule(words=("leaves",)), *base.targets)
     assert (night.service_time, night.removes_targets, night.docks) == (90, base.removes_targets, base.docks)
-    assert night.targets[0].source.startswith("built-in cleaning.toml:")
-    assert night.targets[-1].source == f"{path}:5"
+    assert night.targets[0].source == f"{path}:5"
+    assert night.targets[-1].source.startswith("built-in cleaning.toml:")
     assert (later.targets, later.service_time, later.name) == (night.targets, 90, "later")
     assert later.avoid == (Rule(words=("carpet",)),)
 

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bimnav._door_access import DoorAccess as DoorAccess
     from bimnav._georeference import Georeference as Georeference
     from bimnav._start import Start as Start, find_start as find_start
     from bimnav.assets import Asset as Asset
@@ -78,6 +79,7 @@ if TYPE_CHECKING:
     from bimnav.sim import SimResult as SimResult, simulate as simulate
     from bimnav.stops import Stand as Stand, Stop as Stop, Unreached as Unreached
     from bimnav.tasks import (
+        Overruled as Overruled,
         Rule as Rule,
         Standoff as Standoff,
         Task as Task,
@@ -101,6 +103,7 @@ _HOMES = {
     "bimnav.grid": "Cell GridFrame rasterize",
     "bimnav.ifc": "read_ifc",
     "bimnav.inspection": "inspect",
+    "bimnav._door_access": "DoorAccess",
     "bimnav._georeference": "Georeference",
     "bimnav._start": "Start find_start",
     "bimnav.ifc._federate": "federate",
@@ -115,7 +118,7 @@ _HOMES = {
     "bimnav.robot": "Robot",
     "bimnav.samples": "list_samples sample",
     "bimnav.sim": "SimResult simulate",
-    "bimnav.tasks": "Rule Standoff Task list_tasks load_task",
+    "bimnav.tasks": "Overruled Rule Standoff Task list_tasks load_task",
     "bimnav.verify": "Check check_path check_plan",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
 
 import shapely
 
+from bimnav._door_access import DoorAccess, door_access
+from bimnav._doorways import doorway_of
 from bimnav._floors import FLOOR_SOURCES, NEAR, FloorSource, find_floors, outline
+from bimnav._meaning import what_blocks
 from bimnav.building import Building, Detection, Element, Issue, Space, Storey
 from bimnav.errors import ValueRangeError
 from bimnav.footprint import Footprint, footprints_of, merge_footprints
@@ -22,7 +25,7 @@ Place: TypeAlias = Sequence[Any]
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from bimnav.tasks import Destination, Rule, Task
+    from bimnav.tasks import Choice, Destination, Overruled, Task
 
 __all__ = ["IndoorEnvironment", "Obstacle", "Place", "Region", "Target", "Zone", "make_environment"]
 
@@ -144,12 +147,6 @@ class Zone:
 
 
 _GAP = 0.05  # metres; floors up to twice as far apart, such as a space and a doorway, are one floor
-_NEVER_OBSTACLES = {
-    "IfcDoor": "a door is passable because it is a door",
-    "IfcDoorStandardCase": "a door is passable because it is a door",
-    "IfcSite": "terrain is not an element of a storey",
-    "IfcVirtualElement": "a virtual element has no body",
-}
 _QUARTER = 16  # segments of a quarter circle in a buffer
 
 
@@ -178,6 +175,10 @@ class IndoorEnvironment:
         GlobalIds of elements that no robot of this height meets on any storey.
     issues
         What could not be classified, with GlobalIds.
+    doors
+        How every door is, as the task says, and whether the robot may pass it.
+    overruled
+        Rules that pick an element and do not decide about it, because others go before.
     """
 
     building: Building
@@ -192,6 +193,8 @@ class IndoorEnvironment:
     left_out: tuple[tuple[str, str], ...] = ()
     outside_bands: tuple[str, ...] = ()
     issues: tuple[Issue, ...] = ()
+    doors: tuple[DoorAccess, ...] = ()
+    overruled: tuple[Overruled, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -322,7 +325,7 @@ def make_environment(
         Whether the ground around the building is floor too: slabs and terrain as high as a level, else a
         margin of two metres around the lowest level with a door to the outside.
     """
-    from bimnav.tasks import lint_rules, match
+    from bimnav.tasks import choose, lint_rules
 
     robot = robot or Robot()
     floors, issues = find_floors(building, robot, sources=floor_from, outdoors=outdoors)
@@ -335,29 +338,15 @@ def make_environment(
     )
     walkable = sorted({region.storey for region in regions})
 
-    visited: dict[str, tuple[Element | Space, str, Rule]] = {}
-    for rule in task.targets:
-        for product, why in match(rule, building):
-            visited.setdefault(product.global_id, (product, why, rule))
-    left_out = {p.global_id: f"ignored: {why}" for rule in task.ignore for p, why in match(rule, building)}
-    if task.removes_targets:
-        left_out |= {g: f"target, taken away: {why}" for g, (_, why, _rule) in visited.items()}
-    chosen = {p.global_id: why for rule in task.obstacles for p, why in match(rule, building)}
-    candidates: list[tuple[Element, str]] = []
-    for element in building.elements:
-        if element.ifc_class in _NEVER_OBSTACLES:
-            left_out.setdefault(element.global_id, _NEVER_OBSTACLES[element.ifc_class])
-        elif task.obstacles and element.global_id not in chosen:
-            left_out.setdefault(element.global_id, "no obstacle rule of the task matches")
-        if element.shapes and element.global_id not in left_out:
-            candidates.append((element, chosen.get(element.global_id, "solid in the robot's height band")))
-    obstacles = tuple(_obstacles(candidates, robot, levels, walkable))
+    visited, overruled = choose(task, "targets", building)
+    blocks = what_blocks(task, building, visited)
+    access, doors_overruled = door_access(task, building, robot)
+    obstacles = (
+        *_obstacles(blocks.candidates, robot, levels, walkable),
+        *_closed(access, building, robot, levels, walkable),
+    )
+    zones, zones_overruled = _rated(task, building, levels)
     blocking = {obstacle.global_id for obstacle in obstacles}
-
-    def rated(rules: Iterable[Rule], factor: float | None) -> Iterable[Zone]:
-        for rule in rules:
-            for product, why in match(rule, building):
-                yield from _zones(product, levels, rule.factor if factor is None else factor, why)
 
     environment = IndoorEnvironment(
         building,
@@ -368,15 +357,17 @@ def make_environment(
         regions,
         obstacles,
         targets=(),
-        zones=(*rated(task.avoid, None), *rated(task.restricted, math.inf)),
-        left_out=tuple(sorted(left_out.items())),
-        outside_bands=tuple(e.global_id for e, _ in candidates if e.global_id not in blocking),
+        zones=zones,
+        left_out=tuple(sorted(blocks.left_out.items())),
+        outside_bands=tuple(e.global_id for e, _ in blocks.candidates if e.global_id not in blocking),
         issues=issues,
+        doors=access,
+        overruled=(*overruled, *blocks.overruled, *doors_overruled, *zones_overruled),
     )
-    targets = [_found(product, why, rule, environment) for product, why, rule in visited.values()]
+    targets = [_found(choice, environment) for choice in visited.values()]
     home = None if start is None else environment.storeys_at(start)[0]
     targets += [_placed(detection, environment, home) for detection in building.detections]
-    lost = tuple(p.global_id for (p, *_), t in zip(visited.values(), targets, strict=False) if t is None)
+    lost = tuple(global_id for global_id, target in zip(visited, targets, strict=False) if target is None)
     if lost:
         message = f"{len(lost)} targets of task {task.name!r} have no geometry, so no place to go to."
         issues += (Issue("target-without-shape", message, lost, "error", "Ask for an export with bodies."),)
@@ -409,6 +400,49 @@ def _obstacles(
                 )
 
 
+def _closed(
+    access: Iterable[DoorAccess], building: Building, robot: Robot, levels: Sequence[float], walkable: Sequence[int]
+) -> Iterable[Obstacle]:
+    """Make obstacles of the doorways that the robot may not pass: from jamb to jamb, whatever the leaf's shape."""
+    shut = {door.global_id: door for door in access if not door.is_passable}
+    for door in building.doors:
+        way = doorway_of(door, building) if door.global_id in shut else None
+        if way is None:
+            continue
+        for storey in walkable:
+            low, high = max(way.bottom, levels[storey] + robot.low), min(way.top, levels[storey] + robot.height)
+            if low < high:
+                yield Obstacle(
+                    door.global_id,
+                    door.name,
+                    door.element.ifc_class,
+                    storey,
+                    way.rectangle(),
+                    low,
+                    high,
+                    "exact",
+                    shut[door.global_id].rule,
+                )
+
+
+def _rated(task: Task, building: Building, levels: Sequence[float]) -> tuple[tuple[Zone, ...], tuple[Overruled, ...]]:
+    """Make zones of what is to be avoided or never entered; where both pick a thing, the latter holds."""
+    from bimnav.tasks import Overruled, choose
+
+    avoided, overruled = choose(task, "avoid", building)
+    closed, more = choose(task, "restricted", building)
+    overruled += more
+    zones: list[Zone] = []
+    for global_id, choice in avoided.items():
+        if global_id in closed:
+            overruled.append(Overruled(global_id, choice.why, f"restricted: {closed[global_id].why}"))
+        else:
+            zones += _zones(choice.element, levels, choice.rule.factor, choice.why)
+    for choice in closed.values():
+        zones += _zones(choice.element, levels, math.inf, choice.why)
+    return tuple(zones), tuple(overruled)
+
+
 def _zones(product: Element | Space, levels: Sequence[float], factor: float, why: str) -> Iterable[Zone]:
     bounds = product.bounds
     if bounds is None:
@@ -419,8 +453,9 @@ def _zones(product: Element | Space, levels: Sequence[float], factor: float, why
             yield Zone(product.global_id, product.name, storey, polygon, factor, why)
 
 
-def _found(product: Element | Space, why: str, rule: Rule, environment: IndoorEnvironment) -> Target | None:
+def _found(choice: Choice, environment: IndoorEnvironment) -> Target | None:
     """Make a target of an element: its destination is the middle of its plan view."""
+    product, rule, why = choice
     bounds = product.bounds
     if bounds is None:
         return None

@@ -12,7 +12,7 @@ import ifcopenshell
 
 from bimnav.ifc._prescan import SCHEMAS
 
-__all__ = ["Taken", "attributes", "entities_of", "is_void", "nearest", "products", "products_of", "taken_for"]
+__all__ = ["Taken", "attributes", "entities_of", "is_a", "is_void", "nearest", "products", "products_of", "taken_for"]
 
 _RENAMED = {  # a class to what holds its elements where the schema lacks it
     "IfcBuildingElement": ("IfcBuiltElement",),
@@ -52,6 +52,11 @@ def taken_for(name: str, schema: str) -> Taken:
     if name in products() and f"{name}Type" in entities_of(schema):
         return Taken(f"{name}Type", by_type=True)
     return Taken("")
+
+
+def is_a(name: str, ancestor: str, schema: str) -> bool:
+    """Tell whether a class is another one or a subtype of it."""
+    return ancestor in _ancestors(name, schema)
 
 
 def is_void(name: str) -> bool:

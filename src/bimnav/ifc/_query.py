@@ -15,10 +15,10 @@ from ifcopenshell.util.element import get_psets, get_type
 from ifcopenshell.util.selector import FacetTransformer
 
 from bimnav.errors import SelectorError
-from bimnav.ifc._classes import taken_for
+from bimnav.ifc._classes import is_a, taken_for
 from bimnav.ifc._lint import lint, parse
 
-__all__ = ["evaluate", "plain", "properties_of"]
+__all__ = ["checked", "evaluate", "of_classes", "plain", "properties_of"]
 
 _LOG = logging.getLogger(__name__)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING}
@@ -33,19 +33,53 @@ def evaluate(file: Any, ids: Mapping[int, str], query: str) -> tuple[str, ...]:
     SelectorError
         If the query cannot be parsed or evaluated, or names what does not exist.
     """
-    for finding in lint(query, file.schema_identifier):
+    tree = checked(query, file.schema_identifier)
+    facets = _Facets(file, ids)
+    try:
+        facets.transform(tree)
+    except lark.exceptions.VisitError as error:
+        _refuse(query, f"cannot be evaluated: {error.orig_exc}", "Check its regular expressions and values.")
+    chosen = {entity.id() for entity in facets.get_results()}
+    return tuple(global_id for step_id, global_id in ids.items() if step_id in chosen)
+
+
+def checked(query: str, schema: str) -> Any:
+    """Return the tree of a query that is fit for a schema.
+
+    Raises
+    ------
+    SelectorError
+        If it cannot be parsed, or names what does not exist.
+    """
+    for finding in lint(query, schema):
         if finding.severity == "error":
             context = {"schema": finding.schema} if finding.schema else {}
             _refuse(query, finding.message, finding.hint, finding.column, **context)
         if finding.schema:
             _LOG.log(_LEVELS[finding.severity], "filter %r %s", query, finding.message)
-    facets = _Facets(file, ids)
-    try:
-        facets.transform(parse(query))
-    except lark.exceptions.VisitError as error:
-        _refuse(query, f"cannot be evaluated: {error.orig_exc}", "Check its regular expressions and values.")
-    chosen = {entity.id() for entity in facets.get_results()}
-    return tuple(global_id for step_id, global_id in ids.items() if step_id in chosen)
+    return parse(query)
+
+
+def of_classes(tree: Any, classes: Mapping[str, str], schema: str) -> tuple[str, ...] | None:
+    """Answer a query that asks for classes alone; None if it asks for anything else.
+
+    Parameters
+    ----------
+    classes
+        GlobalIds of all products to their classes.
+    """
+    chosen: set[str] = set()
+    for group in tree.find_data("facet_list"):
+        part: set[str] | None = None
+        for facet in group.children:
+            *signs, name = facet.children[0].children if facet.children[0].data == "entity" else (None,)
+            taken = taken_for(str(name.children[0]), schema) if name is not None else None
+            if taken is None or taken.by_type:
+                return None
+            found = {global_id for global_id, known in classes.items() if is_a(known, taken.name, schema)}
+            part = (set(classes) if part is None else part) - found if signs else (part or set()) | found
+        chosen |= part or set()
+    return tuple(global_id for global_id in classes if global_id in chosen)
 
 
 def properties_of(entity: Any) -> dict[str, dict[str, Any]]:

@@ -19,7 +19,9 @@ __all__ = ["Selector", "selector_for"]
 def selector_for(path: Path, sha256: str, model: Model) -> Selector:
     """Return what answers for the elements and spaces of a model that was read from `path`."""
     rows = (*model.tables["elements"], *model.tables["spaces"])
-    return Selector(path.absolute(), sha256, {row["step_id"]: row["global_id"] for row in rows})
+    ids = {row["step_id"]: row["global_id"] for row in rows}
+    classes = {row["global_id"]: row.get("ifc_class", "IfcSpace") for row in rows}
+    return Selector(path.absolute(), sha256, ids, classes, model.tables["schema"])
 
 
 class Selector:
@@ -34,10 +36,17 @@ class Selector:
     ids
         Step id to GlobalId of every product there is an answer about; two products with one GlobalId in
         the file have two here.
+    classes
+        GlobalId to class of the same products.
+    schema
+        Of the file.
     """
 
-    def __init__(self, path: Path, sha256: str, ids: Mapping[int, str]) -> None:
+    def __init__(
+        self, path: Path, sha256: str, ids: Mapping[int, str], classes: Mapping[str, str], schema: str
+    ) -> None:
         self._path, self._sha256, self._ids = path, sha256, dict(ids)
+        self._classes, self._schema = dict(classes), schema
         self._step_ids = {global_id: step_id for step_id, global_id in self._ids.items()}
         self._answers: dict[str, tuple[str, ...]] = {}
         self._known: dict[str, Facts] = {}
@@ -45,11 +54,13 @@ class Selector:
         self._read_facts: Any = None
         self._assets: Any = None
 
-    def __reduce__(self) -> tuple[type[Selector], tuple[Path, str, dict[int, str]]]:
-        return type(self), (self._path, self._sha256, self._ids)
+    def __reduce__(self) -> tuple[type[Selector], tuple[Path, str, dict[int, str], dict[str, str], str]]:
+        return type(self), (self._path, self._sha256, self._ids, self._classes, self._schema)
 
     def select(self, query: str) -> tuple[str, ...]:
         """Return the GlobalIds of what a query picks; each distinct query is evaluated once.
+
+        A query for classes alone is answered without opening the file.
 
         Raises
         ------
@@ -59,9 +70,10 @@ class Selector:
             If the file is gone or has changed.
         """
         if query not in self._answers:
-            from bimnav.ifc._query import evaluate
+            from bimnav.ifc._query import checked, evaluate, of_classes
 
-            self._answers[query] = evaluate(self._file, self._ids, query)
+            found = of_classes(checked(query, self._schema), self._classes, self._schema)
+            self._answers[query] = evaluate(self._file, self._ids, query) if found is None else found
         return self._answers[query]
 
     def properties(self, global_id: str) -> dict[str, dict[str, Any]]:

@@ -1,17 +1,22 @@
 """Tasks: what a robot is to visit in any building, what blocks it, and why each element was picked."""
 
-from bimnav.tasks._files import TaskInfo, list_tasks, load_task, task_schema
+from bimnav.tasks._choose import Choice, Overruled, choose
+from bimnav.tasks._files import TaskInfo, entourage, list_tasks, load_task, task_schema
 from bimnav.tasks._lint import lint_rules
 from bimnav.tasks._match import Match, match
 from bimnav.tasks._task import Destination, Rule, Standoff, Task
 
 __all__ = [
+    "Choice",
     "Destination",
     "Match",
+    "Overruled",
     "Rule",
     "Standoff",
     "Task",
     "TaskInfo",
+    "choose",
+    "entourage",
     "lint_rules",
     "list_tasks",
     "load_task",

@@ -21,7 +21,7 @@ from bimnav.tasks._toml import Problem, Toml, read_toml
 if TYPE_CHECKING:
     from bimnav.tasks._schema import RuleTable, TaskTable
 
-__all__ = ["VARIABLE", "FileCheck", "TaskInfo", "check_file", "list_tasks", "load_task", "task_schema"]
+__all__ = ["VARIABLE", "FileCheck", "TaskInfo", "check_file", "entourage", "list_tasks", "load_task", "task_schema"]
 
 _LOG = logging.getLogger(__name__)
 
@@ -135,6 +135,15 @@ def check_file(path: str | PathLike[str], *, tasks_path: Folders = ()) -> FileCh
     tasks, problems = _resolved([file], lambda: _known(tasks_path), {})
     found = tuple(problem for _, problem in problems)
     return FileCheck({} if found else tasks, found, file.warnings)
+
+
+@cache
+def entourage() -> Task:
+    """Return the task whose `ignore` says what stands in a model for the picture alone."""
+    name = "meaning.toml"
+    text = files("bimnav.tasks").joinpath(name).read_text(encoding="utf-8")
+    (task,) = _tasks([_read(text, f"built-in {name}", is_linted=True)], dict).values()
+    return task
 
 
 def task_schema() -> dict[str, Any]:
@@ -358,7 +367,7 @@ def _task(name: str, file: _File, base: Task | None) -> Task:
         )
 
     base = base or Task(name)
-    values = _values(table, said=True) | {kind: getattr(base, kind) + rules(kind) for kind in RULE_LISTS}
+    values = _values(table, said=True) | {kind: rules(kind) + getattr(base, kind) for kind in RULE_LISTS}
     return replace(base, name=name, **values, source=_place(file, name))
 
 

@@ -22,6 +22,7 @@ from bimnav.tasks._task import (
     EXPECT,
     RULE_LISTS,
     DoorState,
+    Entourage,
     Objective,
     Place,
     Side,
@@ -155,7 +156,7 @@ class TaskTable(_Table):
     """A job, in words that hold in any building."""
 
     description: str = Field("", description="What the job is, in a line.")
-    extends: str = Field("", description="Name of the task that this one builds on: its rules come first.")
+    extends: str = Field("", description="Name of the task that this one builds on; its own rules go before.")
     targets: list[TargetTable] = Field([], description="What the robot visits.")
     obstacles: list[RuleTable] = Field([], description="What blocks; without any, everything solid in its way.")
     ignore: list[RuleTable] = Field([], description="What does not block even so.")
@@ -170,6 +171,7 @@ class TaskTable(_Table):
     due: Seconds | None = Field(None, description="Time from the beginning within which to serve each target.")
     abilities: Words = Field([], description="What a robot must be able to do at each target.")
     objective: Objective = Field("distance", description="What to keep small: 'distance', 'time' or 'energy'.")
+    entourage: Entourage = Field("ignore", description="Whether people, cars and trees of the picture 'block'.")
     removes_targets: bool = Field(False, description="Whether targets do not block and are gone once served.")
 
 

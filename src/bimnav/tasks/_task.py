@@ -17,6 +17,7 @@ __all__ = [
     "RULE_LISTS",
     "Destination",
     "DoorState",
+    "Entourage",
     "Objective",
     "Place",
     "Rule",
@@ -30,6 +31,7 @@ Place: TypeAlias = Literal["center", "nearest_free", "standoff", "space"]
 Side: TypeAlias = Literal["front", "back", "any"]
 DoorState: TypeAlias = Literal["locked", "automatic", "closed", "open"]
 Objective: TypeAlias = Literal["distance", "time", "energy"]
+Entourage: TypeAlias = Literal["ignore", "block"]
 
 _WORDS = (
     "words",
@@ -226,6 +228,8 @@ class Rule:
 class Task:
     """A job, in words that hold in any building.
 
+    Of several rules in one list that pick an element, the first decides.
+
     Parameters
     ----------
     name, description
@@ -246,7 +250,7 @@ class Task:
     docks
         Where the robot waits and charges; a job begins there if nothing else is said.
     doors
-        How doors are, by the rule's `state`; of several rules that pick a door the first holds.
+        How doors are, by the rule's `state`.
     service_time
         Seconds the robot works at each target.
     destination
@@ -261,6 +265,9 @@ class Task:
         Words for what a robot must be able to do at each target.
     objective
         What to keep small: `distance`, `time` or `energy`.
+    entourage
+        `ignore`: people, cars and trees that stand in the model for the picture do not block. `block`: they
+        do.
     removes_targets
         Whether the robot takes targets away, as litter: they do not block, and once served they are gone.
     source
@@ -289,6 +296,7 @@ class Task:
     due: float | None = None
     abilities: tuple[str, ...] = ()
     objective: Objective = "distance"
+    entourage: Entourage = "ignore"
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -304,6 +312,7 @@ class Task:
             _check_number(f"{told}due", self.due, 0, "seconds")
         object.__setattr__(self, "destination", checked_destination(f"{told}destination", self.destination))
         _check_known(f"{told}objective", self.objective, get_args(Objective))
+        _check_known(f"{told}entourage", self.entourage, get_args(Entourage))
 
 
 def checked_destination(what: str, destination: Any) -> Any:

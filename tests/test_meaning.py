@@ -1,0 +1,209 @@
+"""What blocks by meaning, which rule decides, and how doors are."""
+
+import math
+
+import pytest
+
+from bimnav.building import Building, Door, Element, Mesh, Shape, Space, Storey
+from bimnav.environment import make_environment
+from bimnav.errors import TaskError
+from bimnav.graph import build_graph
+from bimnav.ifc import read_ifc
+from bimnav.robot import Robot
+from bimnav.tasks import Rule, Task
+from tests.conftest import real_model
+
+
+def block(x, y, z, width, depth, height):
+    """Return a box by its lower corner and its size."""
+    corners = [(x + i * width, y + j * depth, z + k * height) for k in (0, 1) for j in (0, 1) for i in (0, 1)]
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    return (Shape(Mesh(corners, [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])),)
+
+
+def proxy(name, type_name="", predefined_type=""):
+    shapes = block(2, 2, 0, 0.5, 0.5, 1.8)
+    return Element(name, "IfcBuildingElementProxy", name, type_name, predefined_type=predefined_type, shapes=shapes)
+
+
+def room_with(*elements):
+    return Building(
+        "room",
+        (Storey("s", "Ground", 0.0),),
+        spaces=(Space("room", "1", "Hall", "s", shapes=block(0, 0, 0, 6, 6, 3)),),
+        elements=elements,
+    )
+
+
+def blocking(environment):
+    return {obstacle.global_id for obstacle in environment.obstacles}
+
+
+@pytest.mark.parametrize(
+    "figure",
+    [
+        proxy("RPC Female:YinYin:123"),
+        proxy("RPC Tree - Deciduous:Scarlet Oak:5"),
+        proxy("BuildingElementProxy", "Man Standing with Turban"),
+        proxy("Baum", "Laubbaum"),
+        proxy("Coche:Sedán:77"),
+        proxy("汽车"),
+        proxy("Figure", predefined_type="ENTOURAGE"),
+        Element("green", "IfcGeographicElement", "Lawn", shapes=block(2, 2, 0, 1, 1, 1)),
+    ],
+    ids=lambda figure: figure.name,
+)
+def test_entourage_does_not_block_and_is_listed_with_the_reason(figure):
+    environment = make_environment(room_with(figure), Task("any"))
+    assert not environment.obstacles
+    [(global_id, why)] = environment.left_out
+    assert global_id == figure.global_id
+    assert why.startswith("entourage: ")
+    asked = make_environment(room_with(figure), Task("any", entourage="block"))
+    assert blocking(asked) == {figure.global_id}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Sofa 3 personas", "Table for 6 people", "Manhole cover", "Elevator Car", "Hand truck", "Car park barrier",
+        "Tree grate", "Potted tree", "Coat tree", "Carro de limpieza", "WC men", "Children slide", "Kast van hout",
+        "Autoclave", "Menlo cabinet", "Forklift truck", "Person counting sensor",
+    ],
+)  # fmt: skip
+def test_what_only_sounds_like_entourage_blocks(name):
+    assert blocking(make_environment(room_with(proxy(name)), Task("any"))) == {name}
+
+
+def test_the_class_decides_with_the_words_a_sofa_named_man_is_furniture():
+    sofa = Element("sofa", "IfcFurniture", "Man cave sofa", shapes=block(2, 2, 0, 1, 1, 1))
+    assert blocking(make_environment(room_with(sofa), Task("any"))) == {"sofa"}
+
+
+def test_a_figure_of_a_real_model_is_entourage():
+    environment = make_environment(
+        read_ifc(real_model("rooms/3rooms_Heater_AirTerminal_Table_with_SB.ifc")), Task("any")
+    )
+    assert dict(environment.left_out)["2qe$lp$Un4i9NnfBo4VcXN"] == "entourage: its type is ENTOURAGE"
+
+
+def test_no_door_part_of_one_opening_or_room_blocks_even_if_a_rule_says_so():
+    door = Element("door", "IfcDoor", "D1", shapes=block(2, 2, 0, 1, 0.1, 2))
+    pane = Element("pane", "IfcPlate", "glass", parent="leaf", shapes=block(2, 2, 0, 1, 0.1, 2))
+    leaf = Element("leaf", "IfcMember", "leaf", parent="door", shapes=block(2, 2, 0, 1, 0.1, 2))
+    wall = Element("wall", "IfcWall", "W", shapes=block(0, 4, 0, 6, 0.2, 3))
+    task = Task("all", obstacles=[Rule("IfcProduct", label="everything")])
+    environment = make_environment(room_with(door, pane, leaf, wall), task)
+    assert blocking(environment) == {"wall"}
+    left_out = dict(environment.left_out)
+    assert left_out == {
+        "door": "a door is passable because it is a door",
+        "leaf": "a part of the door D1",
+        "pane": "a part of the door D1",
+    }
+    lost = {each.global_id: each.by for each in environment.overruled}
+    assert lost == left_out | {"room": "a room is empty; `restricted` closes it"}
+
+
+def test_what_speaks_first_decides_and_the_others_are_listed():
+    litter = Element("litter", "IfcFurniture", "litter box", shapes=block(1, 1, 0, 0.3, 0.3, 0.3))
+    tree = proxy("tree")
+    rules = {
+        "targets": [Rule("IfcFurniture", label="a", priority=3), Rule("IfcFurniture", label="b")],
+        "ignore": [Rule("IfcFurniture", label="soft")],
+        "obstacles": [Rule("IfcFurniture", label="hard"), Rule("IfcBuildingElementProxy", label="proxies")],
+        "avoid": [Rule("IfcSpace", label="slow", factor=2), Rule("IfcSpace", label="slower", factor=5)],
+        "restricted": [Rule("IfcSpace", ["kitchen"], label="kitchen")],
+    }
+    environment = make_environment(room_with(litter, tree), Task("mixed", **rules))
+    assert blocking(environment) == {"tree"}  # a rule that asks for it goes before its being entourage
+    assert [(target.label, target.priority) for target in environment.targets] == [("a", 3)]
+    assert [zone.factor for zone in environment.zones] == [2]
+    told = {(each.global_id, each.rule.split("'")[1], each.by.split("'")[1]) for each in environment.overruled}
+    assert told == {
+        ("litter", "b", "a"),
+        ("litter", "hard", "soft"),
+        ("tree", "trees", "proxies"),
+        ("room", "slower", "slow"),
+    }
+
+
+def test_what_is_never_to_be_entered_goes_before_what_is_only_to_be_avoided():
+    task = Task("t", avoid=[Rule("IfcSpace", factor=9)], restricted=[Rule("IfcSpace", ["hall"], label="closed")])
+    environment = make_environment(room_with(), task)
+    assert [zone.factor for zone in environment.zones] == [math.inf]
+    [lost] = environment.overruled
+    assert "passes the filter 'IfcSpace'" in lost.rule
+    assert lost.by.startswith("restricted: rule 'closed'")
+
+
+def two_rooms():
+    """Return two rooms of 3 by 3 metres, a wall between them, and a door in it."""
+    leaf = Element("door", "IfcDoor", "Fire door", shapes=block(2.95, 1, 0, 0.1, 1, 2))
+    return Building(
+        "flat",
+        (Storey("s", "Ground", 0.0),),
+        spaces=(
+            Space("a", "1", "Hall", "s", shapes=block(0, 0, 0, 2.95, 3, 3)),
+            Space("b", "2", "Store", "s", shapes=block(3.05, 0, 0, 2.95, 3, 3)),
+        ),
+        elements=(
+            Element("south", "IfcWall", "W", shapes=block(2.95, 0, 0, 0.1, 1, 3)),
+            Element("north", "IfcWall", "W", shapes=block(2.95, 2, 0, 0.1, 1, 3)),
+            leaf,
+        ),
+        doors=(Door(leaf),),
+    )
+
+
+def is_joined(building, robot, **rule):
+    task = Task("go", doors=[Rule("IfcDoor", **rule)] if rule else [])
+    environment = make_environment(building, task, robot)
+    graph = build_graph(environment, cell_size=0.25)
+    a, b = (graph.frame.cell_at(x, 1.5) for x in (1.5, 4.5))
+    [door] = environment.doors
+    return door, bool(graph.components[a] == graph.components[b])
+
+
+@pytest.mark.parametrize(
+    ("robot", "rule", "passes", "why"),
+    [
+        (Robot(), {}, True, "the door is closed: no door rule of the task matches"),
+        (Robot(), {"state": "open"}, True, "the door is open: rule 'IfcDoor'"),
+        (Robot(), {"state": "locked"}, False, "the door is locked and robot 'R1' has no key: rule 'IfcDoor'"),
+        (Robot(keys=["Fire door"]), {"state": "locked"}, True, "the door is locked: rule 'IfcDoor'"),
+        (Robot(keys=["door"]), {"state": "locked"}, True, "the door is locked: rule 'IfcDoor'"),
+        (Robot(opens_doors=False), {}, False, "the door is closed and robot 'R1' opens no doors: no door rule"),
+        (Robot(opens_doors=False), {"state": "automatic", "opening_time": 3}, True, "the door is automatic: rule"),
+        (Robot(opens_doors=False), {"words": ["sliding"], "state": "automatic"}, False, "the door is closed and"),
+    ],
+)
+def test_a_door_lets_pass_whom_its_state_allows(robot, rule, passes, why):
+    door, joined = is_joined(two_rooms(), robot, **rule)
+    assert (door.is_passable, joined) == (passes, passes)
+    assert door.rule.startswith(why)
+    assert door.opening_time == rule.get("opening_time", 0)
+
+
+def test_a_locked_door_blocks_from_jamb_to_jamb_and_says_why():
+    environment = make_environment(two_rooms(), Task("go", doors=[Rule("IfcDoor", state="locked", label="vault")]))
+    [shut] = [obstacle for obstacle in environment.obstacles if obstacle.global_id == "door"]
+    assert shut.footprint.bounds == pytest.approx((2.95, 1, 3.05, 2))
+    assert shut.rule.startswith("the door is locked and robot 'R1' has no key: rule 'vault'")
+
+
+def test_entourage_is_ignored_or_blocks_and_nothing_else():
+    with pytest.raises(TaskError, match="entourage is 'maybe'"):
+        Task("any", entourage="maybe")
+
+
+@pytest.mark.parametrize(
+    "name", ["houses/SampleHouse4.ifc", "office/Office_A_20110811.ifc", "nasty/Jesse.1.ifc", "office/demo2.ifc"]
+)
+def test_no_door_opening_or_room_of_a_real_model_blocks(name):
+    building = read_ifc(real_model(name))
+    environment = make_environment(building, Task("any"))
+    never = {door.global_id for door in building.doors} | {space.global_id for space in building.spaces}
+    never |= {opening.global_id for opening in building.openings}
+    assert environment.obstacles
+    assert not never & blocking(environment)
