@@ -83,7 +83,7 @@ def tessellation(path: Path) -> Job:
 
     _extract.read_geometry = stop
     try:
-        _extract.extract(ifcopenshell.open(path))
+        _extract.extract(ifcopenshell.open(path), path.read_bytes())
     except InterruptedError:
         pass
     finally:

@@ -132,7 +132,7 @@ class Sketch:
         return kind
 
     def read(self, **kwargs) -> Building:
-        return to_building(extract(self.file, **kwargs))
+        return to_building(extract(self.file, self.file.to_string().encode(), **kwargs))
 
 
 def volume(shapes) -> float:

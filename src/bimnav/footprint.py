@@ -27,7 +27,17 @@ from bimnav.errors import ValueRangeError
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Footprint", "footprint", "footprints_of", "merge_footprints", "project", "subtract", "unite", "whole"]
+__all__ = [
+    "Footprint",
+    "footprint",
+    "footprints_of",
+    "merge_footprints",
+    "project",
+    "subtract",
+    "triangulate",
+    "unite",
+    "whole",
+]
 
 _TOUCH = 1e-4  # metres taken off both ends of a band: touching is not overlap
 _SLACK = 1e-8  # metres within which a height is the end of the band
@@ -189,6 +199,23 @@ def _solid(fabric: _Fabric) -> manifold3d.Manifold:
     """Hand a closed fabric to manifold3d, which may crash on an open one and takes no read-only array."""
     vertices, faces = np.array(fabric.vertices), np.array(fabric.faces, dtype=np.uint64)
     return manifold3d.Manifold(manifold3d.Mesh64(vertices, faces))
+
+
+def triangulate(rings: Sequence[NDArray[np.float64]]) -> NDArray[np.int64]:
+    """Divide a polygon into triangles whose corners are those of its rings.
+
+    Parameters
+    ----------
+    rings
+        Each (n, 2), open; the outer one runs counter-clockwise, holes run clockwise. Rings that cross
+        themselves are divided all the same; then triangles overlap.
+
+    Returns
+    -------
+    triangles : (m, 3) int64, indexes into the corners of all rings one after the other
+    """
+    triangles: NDArray[np.int64] = manifold3d.triangulate([np.ascontiguousarray(ring) for ring in rings])
+    return triangles.reshape(-1, 3).astype(np.int64)
 
 
 def footprint(shape: Shape, low: float, high: float) -> Footprint:

@@ -54,7 +54,7 @@ class Clipper:
                 return None
             cutters.append(item.SecondOperand)
             item = item.FirstOperand
-        host = self._plain(item)
+        host = self.plain(item)
         if host is None or not cutters:
             return host
         meshes = [self._cutter(cutter, host) for cutter in reversed(cutters)]
@@ -62,7 +62,8 @@ class Clipper:
             return None
         return subtract(host, [(mesh, np.eye(4)) for mesh in meshes if mesh is not None])
 
-    def _plain(self, item: Entity) -> Mesh | None:
+    def plain(self, item: Entity) -> Mesh | None:
+        """Return the mesh of an item that is no difference; None if the fast kernel cannot make it."""
         try:
             mesh = mesh_of(self._kernel.create_shape(item))
         except (RuntimeError, GeometryError):
@@ -89,7 +90,7 @@ class Clipper:
     def _prism(self, item: Entity, plane: NDArray[np.float64], host: Mesh) -> Mesh | None:
         """Return the part of a polygonal half-space that can reach the host; z of `plane` points into it."""
         frame = self.matrix(item.Position)
-        if frame is None or (prism := self._plain(self._extrusion(item.PolygonalBoundary))) is None:
+        if frame is None or (prism := self.plain(self._extrusion(item.PolygonalBoundary))) is None:
             return None
         to_frame = np.linalg.inv(frame)
         normal = to_frame[:3, :3] @ plane[:3, 2]

@@ -36,6 +36,7 @@ def _silent(done: int, total: int, global_id: str) -> None:
 
 def extract(
     file: File,
+    text: bytes = b"",
     *,
     heartbeat: Heartbeat = _silent,
     skip: Collection[str] = (),
@@ -52,6 +53,8 @@ def extract(
     ----------
     file
         An open file; its placements and representations must be free of circles.
+    text
+        What it was parsed from; faceted bodies are read from there, which is many times faster.
     heartbeat
         Called with the number of products begun so far, their total, and the GlobalId of the next one
         before the kernel touches it; empty while it touches several, or none.
@@ -94,7 +97,16 @@ def extract(
 
     distrusted = {step_id for step_id in solids if ids[step_id] in thorough}
     geometry = read_geometry(
-        file, wanted, solids, contexts, relations.openings_of(), working_on, thorough=distrusted, careful=careful
+        file,
+        wanted,
+        solids,
+        contexts,
+        relations.openings_of(),
+        working_on,
+        text=text,
+        unit_scale=unit_scale,
+        thorough=distrusted,
+        careful=careful,
     )
     heartbeat(len(wanted), len(wanted), "")
     lost |= {step_id: reason for step_id, reason in geometry.lost.items() if step_id not in left_out}

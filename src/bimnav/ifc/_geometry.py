@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bimnav.building import Mesh
+from bimnav.ifc._facets import Facets
 from bimnav.ifc._kernel import Entity, File
 from bimnav.ifc._tessellate import Reading, Tessellator
 from bimnav.ifc._voids import Cutter, Placed, cut_all
@@ -103,6 +104,8 @@ def read_geometry(
     working_on: Callable[[int], None],
     *,
     thorough: Collection[int] = (),
+    text: bytes = b"",
+    unit_scale: float = 1.0,
     careful: bool = False,
 ) -> Geometry:
     """Tessellate products and cut their openings.
@@ -121,10 +124,17 @@ def read_geometry(
         Called with the step id of each product before it is touched; 0 before all are.
     thorough
         Step ids of products that the fast kernel must not touch.
+    text
+        What `file` was parsed from; without it all goes through the kernel.
+    unit_scale
+        Metres per length unit.
     careful
         Whether to touch only one at a time.
     """
-    tessellator = Tessellator(file, solids, contexts, working_on, thorough=thorough, careful=careful)
+    facets = Facets(text, unit_scale) if text else None
+    tessellator = Tessellator(
+        file, solids, contexts, working_on, facets=facets, unit_scale=unit_scale, thorough=thorough, careful=careful
+    )
     readings = tessellator.read(products)
     geometry = Geometry(meshes=tessellator.meshes)
     cutter = Cutter(geometry.meshes)

@@ -11,11 +11,23 @@ import ifcopenshell
 import ifcopenshell.geom
 import numpy as np
 from ifcopenshell.util.shape import get_faces, get_vertices
+from numpy.typing import NDArray
 
 from bimnav.building import Mesh
 from bimnav.errors import GeometryError
 
-__all__ = ["FAST", "THOROUGH", "Entity", "File", "iterate", "mesh_of", "new_log", "one_by_one", "settings_for"]
+__all__ = [
+    "FAST",
+    "THOROUGH",
+    "Entity",
+    "File",
+    "check_size",
+    "iterate",
+    "mesh_of",
+    "new_log",
+    "one_by_one",
+    "settings_for",
+]
 
 Entity = Any  # an ifcopenshell.entity_instance; what attributes it has depends on its class
 File = Any  # an ifcopenshell.file
@@ -43,6 +55,7 @@ def settings_for(contexts: Iterable[int], *, openings: bool = False) -> Any:
     settings.set("no-normals", True)
     settings.set("apply-default-materials", False)
     settings.set("context-ids", sorted(contexts))
+    settings.set("no-wire-intersection-check", not openings)  # more than half of OpenCASCADE's time
     return settings
 
 
@@ -92,7 +105,18 @@ def mesh_of(geometry: Any) -> Mesh:
         If they are not finite, or larger than any building.
     """
     vertices = get_vertices(geometry)
+    check_size(vertices)
+    return Mesh(vertices, get_faces(geometry))
+
+
+def check_size(vertices: NDArray[np.float64]) -> None:
+    """Refuse a body, (n, 3) metres, that is larger than any building.
+
+    Raises
+    ------
+    GeometryError
+        If it is.
+    """
     size = float(np.ptp(vertices, axis=0).max()) if len(vertices) else 0.0
     if size > _LARGEST:
         raise GeometryError(f"its body is {size:.6g} m long.")
-    return Mesh(vertices, get_faces(geometry))

@@ -67,10 +67,9 @@ def read(
     if said is not None:
         _check_parsed(file, log, said, path.name)
     broken = broken_products(file, text, log)
-    del text
     listener.stage("reading")
     try:
-        model = extract(file, heartbeat=listener.beat, skip=skip, thorough=thorough, careful=careful, log=log)
+        model = extract(file, text, heartbeat=listener.beat, skip=skip, thorough=thorough, careful=careful, log=log)
     except (IfcStructureError, IfcUnitsError) as error:  # which do not know the name
         raise type(error)(f"{path.name}: {error.message}", error.hint, {"file": path.name, **error.context}) from error
     except GeometryError as error:  # nobody foresaw it: as good as a crash at the product in hand

@@ -16,6 +16,7 @@ from bimnav.building import Mesh
 from bimnav.errors import GeometryError
 from bimnav.ifc._canonical import canonical
 from bimnav.ifc._clips import Clipper
+from bimnav.ifc._facets import Bodies, Facets
 from bimnav.ifc._kernel import FAST, THOROUGH, Entity, File, iterate, mesh_of, new_log, settings_for
 from bimnav.ifc._products import is_body
 
@@ -24,6 +25,7 @@ __all__ = ["Reading", "Tessellator"]
 _FARTHEST = 1e8  # metres from the origin
 _LARGE = 100  # faces; the fast kernel makes smaller meshes alike in every run, and 600 are not
 _FEW = 50  # products; so many are soon set up one by one, and then it is known which one stalls
+_MIRROR = np.diag((-1.0, 1.0, 1.0, 1.0))
 _STEP_ID = re.compile(r"#(\d+)=")
 
 
@@ -66,6 +68,10 @@ class Tessellator:
         Called with the step id of each product before the kernel touches it; with 0 before it touches all.
     thorough
         Step ids of products that the fast kernel must not touch.
+    facets
+        Reads faceted bodies; the kernel does, if there is none.
+    unit_scale
+        Metres per length unit.
     careful
         Whether to give the kernel one product at a time, which is slower, and never touches all.
     """
@@ -78,6 +84,8 @@ class Tessellator:
         working_on: Callable[[int], None],
         *,
         thorough: Collection[int] = (),
+        facets: Facets | None = None,
+        unit_scale: float = 1.0,
         careful: bool = False,
     ) -> None:
         self.file = file
@@ -86,6 +94,8 @@ class Tessellator:
         self._contexts = contexts
         self._working_on = working_on
         self._thorough = thorough
+        self._facets = facets
+        self._unit_scale = unit_scale
         self._careful = careful
         self._index: dict[tuple[bytes, bytes], int] = {}
         self._known: dict[tuple[str, bool, str], tuple[int, frozenset[int]]] = {}
@@ -93,11 +103,12 @@ class Tessellator:
     def read(self, products: Sequence[Entity]) -> dict[int, Reading]:
         """Tessellate products without cutting their openings.
 
-        What the fast kernel drops, leaves incomplete or complains about is clipped by our own means or
-        handed to the thorough one; the better of the two readings counts.
+        Faceted bodies do not go to a kernel. What the fast one drops, leaves incomplete or complains about
+        is clipped by our own means or handed to the thorough one; the better of the two readings counts.
         """
         trusted = [product for product in products if product.id() not in self._thorough]
-        readings = {product.id(): Reading() for product in products} | self._iterate(trusted, FAST)
+        readings = {product.id(): Reading() for product in products} | self._read_faceted(trusted)
+        readings |= self._iterate([p for p in trusted if not readings[p.id()].shapes], FAST)
         doubtful = [product for product in products if not self._is_complete(product, readings)]
         clipped = self._clip_all([product for product in doubtful if product.id() not in self._thorough])
         readings |= clipped
@@ -179,6 +190,32 @@ class Tessellator:
             self._index[content] = len(self.meshes)
             self.meshes.append(mesh)
         return self._index[content]
+
+    def _read_faceted(self, products: Sequence[Entity]) -> dict[int, Reading]:
+        """Read those of the products that have faceted bodies, perhaps beside others."""
+        readings: dict[int, Reading] = {}
+        if self._facets is None:
+            return readings
+        clipper = Clipper(self.file, settings_for(self._contexts))
+        bodies = Bodies(self._facets, clipper, self._solids, self._unit_scale, self._keep)
+        for product in products:
+            if not bodies.is_faceted(product):
+                continue
+            self._working_on(product.id())
+            placed = bodies.read(product)
+            if placed is None or not all(np.abs(where).max() <= _FARTHEST for _, where in placed):
+                continue
+            readings[product.id()] = Reading(items={item.id() for item in self._solids[product.id()]})
+            for mesh, where in placed:
+                readings[product.id()].add(*self._unmirrored(mesh, where))
+        return readings
+
+    def _unmirrored(self, index: int, placement: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
+        """Mirror a mesh that its placement mirrors, so that the placement need not."""
+        if np.linalg.det(placement[:3, :3]) > 0.0:
+            return index, placement
+        mesh = self.meshes[index]
+        return self._keep(Mesh(mesh.vertices @ _MIRROR[:3, :3], mesh.faces[:, ::-1], mesh.quality)), placement @ _MIRROR
 
     def _clip_all(self, products: Sequence[Entity]) -> dict[int, Reading]:
         """Read those of the products that are solids minus half-spaces or other solids."""
