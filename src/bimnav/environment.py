@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from bimnav.tasks import Choice, Destination, Overruled, Task
 
-__all__ = ["IndoorEnvironment", "Obstacle", "Place", "Region", "Target", "Zone", "make_environment"]
+__all__ = ["IndoorEnvironment", "Obstacle", "Place", "Region", "Target", "Zone", "make_environment", "rules_overruled"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -372,6 +372,15 @@ def make_environment(
         message = f"{len(lost)} targets of task {task.name!r} have no geometry, so no place to go to."
         issues += (Issue("target-without-shape", message, lost, "error", "Ask for an export with bodies."),)
     return replace(environment, targets=tuple(t for t in targets if t is not None), issues=issues)
+
+
+def rules_overruled(task: Task, building: Building, robot: Robot | None = None) -> tuple[Overruled, ...]:
+    """Return the rules of a task that pick an element of a building and do not decide, because others go before."""
+    from bimnav.tasks import choose
+
+    visited, overruled = choose(task, "targets", building)
+    doors = door_access(task, building, robot or Robot())[1]
+    return (*overruled, *what_blocks(task, building, visited).overruled, *doors, *_rated(task, building, ())[1])
 
 
 def _obstacles(

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from bimnav.building import Building, Issue
 from bimnav.tasks._match import told
-from bimnav.tasks._task import RULE_LISTS, Task
+from bimnav.tasks._task import RULE_LISTS, Rule, Task
 from bimnav.tasks._toml import Key, Problem, Toml
 
 if TYPE_CHECKING:
     from bimnav.ifc._lint import Finding
 
-__all__ = ["lint_filters", "lint_rules"]
+__all__ = ["lint_filters", "lint_rule", "lint_rules"]
 
 
 def lint_filters(toml: Toml) -> tuple[list[Problem], list[Problem]]:
@@ -33,22 +33,21 @@ def lint_filters(toml: Toml) -> tuple[list[Problem], list[Problem]]:
 
 def lint_rules(task: Task, building: Building) -> tuple[Issue, ...]:
     """Return what the filters of a task are taken for in the schemas of a building, where those lack a class."""
+    found = (note for kind in RULE_LISTS for rule in getattr(task, kind) for note in lint_rule(rule, building))
+    return tuple(dict.fromkeys(found))
+
+
+def lint_rule(rule: Rule, building: Building) -> tuple[Issue, ...]:
+    """Return what a rule's filter is taken for in the schemas of a building, where those lack a class."""
     if not building.schema:
         return ()
     from bimnav.ifc._lint import lint
 
-    schemas = building.schema.split(", ")
-    found = {
-        (rule, finding): None
-        for kind in RULE_LISTS
-        for rule in getattr(task, kind)
-        for schema in schemas
-        for finding in lint(rule.filter, schema)
-        if finding.schema
-    }
+    found = {finding: None for schema in building.schema.split(", ") for finding in lint(rule.filter, schema)}
     return tuple(
         Issue("filter", f"{told(rule)}: {_told(rule.filter, f)}", (), "info" if f.severity == "info" else "warning")
-        for rule, f in found
+        for f in found
+        if f.schema
     )
 
 

@@ -16,7 +16,7 @@ from bimnav.tasks._conditions import parse_condition
 from bimnav.tasks._task import Rule
 from bimnav.tasks._words import folded, haystack, needle
 
-__all__ = ["Match", "find", "match", "told"]
+__all__ = ["Match", "filtered", "find", "match", "told"]
 
 Product: TypeAlias = Element | Space
 Test: TypeAlias = Callable[[Product], "str | None"]  # None: fails; else why it holds, or nothing to say
@@ -47,7 +47,7 @@ def match(rule: Rule, building: Building) -> tuple[Match, ...]:
     if not rule.is_met(len(found)):
         raise TaskError(
             f"{told(rule)} finds {len(found)} in {building.name!r} and expects {rule.expect}.",
-            f"Its filter {rule.filter!r} alone picks {len(_filtered(rule, building))}.",
+            f"Its filter {rule.filter!r} alone picks {len(filtered(rule, building))}.",
             {"rule": rule.label, "source": rule.source, "found": len(found), "expect": rule.expect},
         )
     return found
@@ -57,7 +57,7 @@ def find(rule: Rule, building: Building) -> tuple[Match, ...]:
     """Return what a rule picks, however many it expects."""
     tests = [make(rule, building) for make in _TESTS]
     found = []
-    for product in _filtered(rule, building):
+    for product in filtered(rule, building):
         reasons = _reasons(product, tests)
         if reasons is not None:
             why = ", ".join(filter(None, reasons)) or f"{product.ifc_class} passes the filter {rule.filter!r}"
@@ -76,7 +76,14 @@ def _reasons(product: Product, tests: Iterable[Test]) -> list[str] | None:
     return reasons
 
 
-def _filtered(rule: Rule, building: Building) -> tuple[Product, ...]:
+def filtered(rule: Rule, building: Building) -> tuple[Product, ...]:
+    """Return what the filter of a rule picks by itself.
+
+    Raises
+    ------
+    SelectorError
+        If it cannot be evaluated.
+    """
     known = _picked.setdefault(building, {})
     if rule.filter not in known:
         try:
