@@ -48,7 +48,7 @@ class Cut(NamedTuple):
     cost: NDArray[np.float32]
     obstacle: NDArray[np.bool_]
     floor: NDArray[np.bool_]
-    targets: tuple[tuple[Target, Cell], ...]
+    targets: tuple[tuple[Target, Cell | None], ...]
     conflicts: tuple[Conflict, ...]
 
 
@@ -80,7 +80,9 @@ def cut(environment: IndoorEnvironment, cell_size: float, on_conflict: Literal["
                 touched = rasterize(frame, zone.polygon)
                 cost[storey][touched] = np.maximum(cost[storey][touched], np.float32(zone.factor))
     targets = tuple(_targets_in(frame, environment))
-    conflicts = tuple(conflict_at(frame, environment, target, cell) for target, cell in targets if obstacle[cell])
+    conflicts = tuple(
+        conflict_at(frame, environment, target, cell) for target, cell in targets if cell is not None and obstacle[cell]
+    )
     reached = tuple(np.array([conflict.cell for conflict in conflicts], dtype=int).reshape(-1, 3).T)
     kept = cost[reached]
     cost[obstacle | ~walkable] = np.inf
@@ -97,12 +99,15 @@ def zone_factor(frame: GridFrame, environment: IndoorEnvironment, cell: Cell) ->
     return max((zone.factor for zone in zones if rasterize(alone, zone.polygon).any()), default=1.0)
 
 
-def _targets_in(frame: GridFrame, environment: IndoorEnvironment) -> Iterable[tuple[Target, Cell]]:
+def _targets_in(frame: GridFrame, environment: IndoorEnvironment) -> Iterable[tuple[Target, Cell | None]]:
     for target in environment.targets:
         x, y, _ = target.destination
         try:
             yield target, frame.cell_at(x, y, storey=target.storey)
         except OutsideMapError as error:
+            if target.source == "model":  # on the outside of a wall; it may be in reach even so
+                yield target, None
+                continue
             raise OutsideMapError(
                 f"target {target.name!r} ({target.global_id}) at ({x:.3f}, {y:.3f}) lies outside the map.",
                 error.hint,

@@ -95,19 +95,22 @@ def _targets(mission: Mission) -> list[dict[str, Any]]:
     rows = []
     for target, cell in mission.graph.targets:
         stop = stops.get(target.global_id)
+        place = stop.cell if stop else cell
         row: dict[str, Any] = {
             "global_id": target.global_id,
             "name": target.name,
             "source": target.source,
             "rule": target.rule,
-            "cell": list(stop.cell if stop else cell),
+            "cell": None if place is None else list(place),
             "destination": list(target.destination),
             "reached": stop is not None,
         }
         if stop is not None:
             row |= {"approach": stop.approach, "end": list(stop.end), "distance": stop.distance}
+            row["heading"] = stop.heading
         else:
-            row["reason"] = unreached[target.global_id].reason
+            lost = unreached[target.global_id]
+            row |= {"reason": lost.reason, "miss": lost.miss, "blocking": list(lost.blocking)}
         rows.append(row)
     return rows
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from bimnav import search
+from bimnav._approach import stop_for
 from bimnav._changes import Changes, Placed, cells_under, changed_arrays, indexes_of
 from bimnav._cut import FINEST, Conflict, conflict_at, cut, zone_factor
 from bimnav._explicit import Edges, networkx_of, rustworkx_of
@@ -25,7 +26,7 @@ from bimnav.errors import GeometryError, GridError, ModelError, ValueRangeError
 from bimnav.grid import Cell, GridFrame
 from bimnav.links import Link, RefusedConnector, is_near_connector, join_connectors
 from bimnav.robot import Robot
-from bimnav.stops import Stop, Unreached, standing_at, stop_at, why_not_served
+from bimnav.stops import Stop, Unreached
 
 if TYPE_CHECKING:
     import networkx
@@ -67,7 +68,7 @@ class NavGraph:
     environment
         Where it comes from; None for a graph made from a mask.
     targets
-        Every target and the cell that holds its destination.
+        Every target and the cell that holds its destination; None for one outside the map.
     conflicts
         Targets whose cell is also an obstacle cell.
     on_conflict
@@ -89,7 +90,7 @@ class NavGraph:
     floor: NDArray[np.bool_]
     connectivity: Literal[4, 8] = 4
     environment: IndoorEnvironment | None = None
-    targets: tuple[tuple[Target, Cell], ...] = ()
+    targets: tuple[tuple[Target, Cell | None], ...] = ()
     conflicts: tuple[Conflict, ...] = ()
     on_conflict: Literal["approach", "reach"] = "approach"
     connectors: tuple[Link, ...] = ()
@@ -170,7 +171,8 @@ class NavGraph:
             self.obstacle, NodeKind.OBSTACLE, np.where(self.floor, NodeKind.REGULAR, NodeKind.OUTSIDE)
         ).astype(np.uint8)
         for _, cell in self.targets:
-            kinds[cell] = NodeKind.TARGET
+            if cell is not None:
+                kinds[cell] = NodeKind.TARGET
         kinds.flags.writeable = False
         return kinds
 
@@ -245,8 +247,8 @@ class NavGraph:
     def stops_from(self, start: Cell | None) -> tuple[tuple[Stop, ...], tuple[Unreached, ...]]:
         """Return where a robot goes for every target, and the targets it cannot serve from a start.
 
-        A target whose cell is blocked is served from the nearest cell, within three metres, that the
-        robot can reach and from which no wall stands in the way.
+        A robot drives onto a target's own point, if the target asks for nothing else and it can. Else it
+        stands within its reach of the target, where nothing hides the target from it.
 
         Parameters
         ----------
@@ -257,15 +259,11 @@ class NavGraph:
         stops: list[Stop] = []
         unreached: list[Unreached] = []
         for target, cell in self.targets:
-            stop = stop_at(self, target, cell) or standing_at(self, target, component)
-            if stop is None:
-                reason = why_not_served(self, target, cell)
-            elif component is not None and self.components[stop.cell] != component:
-                reason = "no way from the start: its cell lies in another part of the building"
+            found = stop_for(self, target, cell, component)
+            if isinstance(found, Stop):
+                stops.append(found)
             else:
-                stops.append(stop)
-                continue
-            unreached.append(Unreached(target.global_id, target.name, target.destination, reason, cell))
+                unreached.append(found)
         return tuple(stops), tuple(unreached)
 
     def block(self, cells: Iterable[Cell]) -> Self:
@@ -397,12 +395,13 @@ class NavGraph:
         before = self.changes
         if environment is None or not (len(under) or before.placed):
             return self.conflicts
-        flat = np.array([indexes_of([cell], self.frame)[0] for _, cell in self.targets], dtype=np.int64)
+        within = [(target, cell) for target, cell in self.targets if cell is not None]
+        flat = np.array([indexes_of([cell], self.frame)[0] for _, cell in within], dtype=np.int64)
         over = np.isin(flat, under)
         was_over = np.isin(flat, np.concatenate([np.zeros(0, np.int64), *(entry.cells for entry in before.placed)]))
         known = {(c.global_id, c.cell): c for c in self.conflicts}
         conflicts = []
-        for (target, cell), now, then, index in zip(self.targets, over, was_over, flat.tolist(), strict=True):
+        for (target, cell), now, then, index in zip(within, over, was_over, flat.tolist(), strict=True):
             if now or then:
                 place = np.searchsorted(before.cells, index)
                 recorded = place < len(before.cells) and before.cells[place] == index

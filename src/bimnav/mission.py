@@ -151,7 +151,7 @@ def run(
 def _refuse_targets_outside(graph: NavGraph, environment: IndoorEnvironment) -> None:
     """Refuse a target that the user placed where there is neither floor nor an obstacle."""
     for target, cell in graph.targets:
-        if target.source != "user" or graph.free[cell] or graph.obstacle[cell]:
+        if cell is None or target.source != "user" or graph.free[cell] or graph.obstacle[cell]:
             continue
         x, y, _ = target.destination
         if not environment.floor(target.storey).intersects(shapely.Point(x, y)):

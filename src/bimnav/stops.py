@@ -2,34 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
-
-import numpy as np
-import shapely
+from typing import Literal, NamedTuple
 
 from bimnav.grid import Cell
 
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
+__all__ = ["Approach", "Stand", "Stop", "Unreached"]
 
-    from bimnav.environment import Target
-    from bimnav.graph import NavGraph
-
-__all__ = ["Stand", "Stop", "Unreached", "standing_at", "stop_at", "why_not_served"]
-
-Approach = Literal["center", "standing", "reach"]
-
-_REACH = 3.0  # metres; a robot that stands farther away does not serve its target
-_PARTITIONS = (
-    "IfcWall",
-    "IfcWallStandardCase",
-    "IfcWallElementedCase",
-    "IfcCurtainWall",
-    "IfcPlate",
-    "IfcWindow",
-)
+Approach = Literal["center", "standing", "reach", "space"]
 
 
 class Stand(NamedTuple):
@@ -67,7 +47,7 @@ class Stop:
         Where the robot comes to stand: the destination, or the middle of the cell for `standing`.
     approach
         `center`: on the destination. `standing`: next to it, because its cell is blocked.
-        `reach`: on it although its cell is blocked, as in the paper.
+        `reach`: on it although its cell is blocked, as in the paper. `space`: anywhere in its room.
     distance
         From `end` to `destination`, metres.
     heading
@@ -114,84 +94,25 @@ class Stop:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unreached:
-    """A target that is not served, and why."""
+    """A target that is not served, and why.
+
+    Parameters
+    ----------
+    reason
+        In words, with what is in the way.
+    cell
+        The cell of its destination, if there is one.
+    miss
+        How far the nearest place is off, metres: beyond the robot's reach, or above it; 0 where only
+        sight is missing, None where it is not known.
+    blocking
+        GlobalIds of what is in the way.
+    """
 
     global_id: str
     name: str
     destination: tuple[float, float, float]
     reason: str
     cell: Cell | None = None
-
-
-def stop_at(graph: NavGraph, target: Target, cell: Cell) -> Stop | None:
-    """Return the stop on the target's own point, or in its cell, if the robot can be there."""
-    if not graph.free[cell]:
-        return None
-    reach = bool(graph.obstacle[cell])
-    clear = graph.environment is None or graph.environment.is_clear(target.storey, target.destination)
-    if clear or reach:
-        return Stop(
-            target.global_id,
-            target.name,
-            cell,
-            target.destination,
-            target.destination,
-            "reach" if reach else "center",
-            **_asked(target),
-        )
-    return _standing_stop(graph, target, cell)
-
-
-def _standing_stop(graph: NavGraph, target: Target, cell: Cell) -> Stop:
-    end = graph.frame.center_of(cell)
-    distance = math.dist(end, target.destination)
-    return Stop(target.global_id, target.name, cell, target.destination, end, "standing", distance, **_asked(target))
-
-
-def _asked(target: Target) -> dict[str, Any]:
-    """Return what is asked of a robot at a target, for its stop."""
-    return {name: getattr(target, name) for name in ("source", "service_time", "priority", "due", "abilities")}
-
-
-def standing_at(graph: NavGraph, target: Target, component: int | None) -> Stop | None:
-    """Return the stop on the nearest safe cell within reach that sees the target."""
-    frame, storey = graph.frame, target.storey
-    x, y, _ = target.destination
-    free = graph.free[storey]
-    if component is not None:
-        free = free & (graph.components[storey] == component)
-    rows, cols = np.nonzero(free)
-    centers = frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
-    distance = np.hypot(centers[:, 0] - x, centers[:, 1] - y)
-    near = np.flatnonzero(distance <= _REACH)
-    # equally near cells go by row and column; nanometres of difference are rounding
-    near = near[np.lexsort((cols[near], rows[near], np.round(distance[near], 9)))]
-    walls = _walls_near(graph, target)
-    for k in near.tolist():
-        sight = shapely.LineString([(x, y), centers[k, :2]])
-        if not any(wall.intersects(sight) for wall in walls):
-            return _standing_stop(graph, target, Cell(storey, int(rows[k]), int(cols[k])))
-    return None
-
-
-def _walls_near(graph: NavGraph, target: Target) -> list[BaseGeometry]:
-    """Return what a robot cannot work through, but for what holds the target itself."""
-    if graph.environment is None:
-        return []
-    point = shapely.Point(target.destination[:2])
-    return [
-        obstacle.footprint
-        for obstacle in graph.environment.obstacles_on(target.storey)
-        if obstacle.ifc_class in _PARTITIONS and 0 < obstacle.footprint.distance(point) <= _REACH
-    ]
-
-
-def why_not_served(graph: NavGraph, target: Target, cell: Cell) -> str:
-    """Say why a target has no stop."""
-    if not graph.obstacle[cell]:
-        return f"it lies on no floor, and no standing cell is within {_REACH:g} m"
-    by = [c for c in graph.conflicts if c.global_id == target.global_id]
-    blocking = by[0].obstacles if by else ()
-    building = graph.environment.building if graph.environment else None
-    names = ", ".join(f"{building[g].name} ({g})" if building and g in building else g for g in blocking)
-    return f"its cell is blocked by {names}, and no reachable standing cell within {_REACH:g} m sees it"
+    miss: float | None = None
+    blocking: tuple[str, ...] = ()
