@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +13,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bimnav._sight import Scene, points_on, sight_of
+from bimnav._meaning import NOT_LISTED
+from bimnav._sight import LIFTED, UNDER, Scene, points_on, sight_of
 from bimnav.building import Element
 from bimnav.grid import Cell
 from bimnav.robot import Robot
@@ -28,10 +30,9 @@ __all__ = ["stop_for"]
 _MOST = 8  # places for one target
 _APART = math.radians(30)  # as seen from the target
 _FARTHER = 1.0  # metres beyond the nearest place; a tour gains little from walking farther round its target
-_BELOW = 0.6  # metres; so deep one reaches under the floor: raised floors, pits
 _COVER = 0.5  # metres; what is sunk into a wall deeper than this is behind it
+_NAMED = 3  # of the things that hide a target
 _AT_ONCE = 64  # cells looked at together
-_LIFTED = 0.1  # metres; floor panels and finishes thinner than this are lifted to reach below them
 _ARM = 0.1  # metres above the floor, where a robot reaches lowest
 _REACH = 3.0  # metres; of robots without an environment, as of the default one
 
@@ -76,7 +77,7 @@ def find_stands(graph: NavGraph, target: Target, component: int | None) -> tuple
         if stands:
             return stands, miss
         misses.append(miss)
-    return (), misses[0]
+    return (), min(misses, key=lambda miss: miss.distance)
 
 
 def room_stands(graph: NavGraph, target: Target, component: int | None) -> tuple[Stand, ...]:
@@ -179,9 +180,13 @@ class _Aim:
 
     @cached_property
     def without(self) -> frozenset[str]:
-        """GlobalIds of the target itself, of what it is a part of and of the parts of that, and of what is ignored."""
+        """GlobalIds of the target itself, of what it is a part of and of the parts of that, and of what never blocks.
+
+        What the task merely does not list as an obstacle still hides; a door does if it is closed for the robot.
+        """
         environment, element = self.environment, self.element
-        ignored = {g for g, why in environment.left_out if why.startswith(("ignored", "target, taken"))}
+        ignored = {g for g, why in environment.left_out if why != NOT_LISTED}
+        ignored -= {obstacle.global_id for obstacle in environment.obstacles}
         family = {self.target.global_id}
         if element is not None:
             heads = {element.global_id} | ({element.parent} if element.parent else set())
@@ -203,7 +208,7 @@ def _storeys(environment: IndoorEnvironment, target: Target) -> list[int]:
         storey
         for storey in walkable
         if storey != target.storey
-        and environment.levels[storey] - _BELOW <= high
+        and environment.levels[storey] - UNDER <= high
         and low <= environment.levels[storey] + (environment.robot.height if math.isinf(reach) else reach)
     ]
     return [target.storey, *sorted(others, key=lambda s: (abs(environment.levels[s] - low), s))]
@@ -220,7 +225,7 @@ class _Search:
         self.level = self.environment.levels[storey]
         self.aim = _Aim(self.environment, target)
         heights = self.aim.points[:, 2] - self.level
-        self.points = self.aim.points[(heights >= -_BELOW) & (heights <= self.robot.reach_height + 1e-9)]
+        self.points = self.aim.points[(heights >= -UNDER) & (heights <= self.robot.reach_height + 1e-9)]
         around = self.aim.points[:, :2]
         (x0, y0), (x1, y1) = around.min(axis=0) - self.robot.reach, around.max(axis=0) + self.robot.reach
         self.cells, self.centers = _free_cells(graph, storey, (x0, y0, x1, y1), component)
@@ -234,12 +239,12 @@ class _Search:
         order, off = self._ranked()
         if not len(order):
             return (), self._too_far(off)
-        stands, first = self._seen(order, hosts=())
+        stands, blockers = self._seen(order, hosts=())
         if not stands:
             hosts = self.scene.holding(self.points)
             if hosts:
                 stands, _ = self._seen(order, hosts=hosts)
-        return stands, Miss("") if stands else self._hidden(order, first)
+        return stands, Miss("") if stands else self._hidden(order, blockers)
 
     def sees_from(self, cell: Cell) -> bool:
         """Tell whether the robot sees the target from a free cell."""
@@ -301,33 +306,32 @@ class _Search:
         lifted = {
             element.global_id
             for element, around in zip(scene.elements, scene.boxes, strict=True)
-            if abs(around[1, 2] - self.level) <= _LIFTED and around[1, 2] - around[0, 2] <= _LIFTED
+            if abs(around[1, 2] - self.level) <= LIFTED and around[1, 2] - around[0, 2] <= LIFTED
         }
         return sight.within(box, without | lifted)
 
-    def _seen(self, order: NDArray[np.int64], *, hosts: Sequence[int]) -> tuple[tuple[Stand, ...], int]:
-        """Go through the cells from the best on; return the places found, and what hides the target from the first."""
+    def _seen(self, order: NDArray[np.int64], *, hosts: Sequence[int]) -> tuple[tuple[Stand, ...], Counter[int]]:
+        """Go through the cells from the best on; return the places found, and how often what hides the target."""
         found: list[Stand] = []
         angles: list[float] = []
-        blocker, cover = -1, _COVER
+        blockers, cover = Counter[int](), _COVER
         x, y, _ = self.target.destination
         for begin in range(0, len(order), _AT_ONCE):
             chunk = order[begin : begin + _AT_ONCE]
             hidden, first = self._cover(chunk, hosts)
-            if blocker < 0 and len(first):
-                blocker = int(first[0])
+            blockers.update(first[first >= 0].tolist())
             for k, deep in zip(chunk.tolist(), hidden.tolist(), strict=True):
                 if deep > cover:
                     continue
                 stand = self._stand(k)
                 if found and (stand.distance > found[0].distance + _FARTHER or len(found) == _MOST):
-                    return tuple(found), blocker
+                    return tuple(found), blockers
                 angle = math.atan2(stand.end[1] - y, stand.end[0] - x)
                 if all(abs(math.remainder(angle - other, math.tau)) >= _APART for other in angles):
                     cover = deep * 1.5 + 0.05 if not found else cover
                     found.append(stand)
                     angles.append(angle)
-        return tuple(found), blocker
+        return tuple(found), blockers
 
     def _cover(self, chunk: NDArray[np.int64], hosts: Sequence[int]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return through how much of its hosts each cell sees the target, inf if not at all, and what is in the way."""
@@ -344,7 +348,7 @@ class _Search:
         for row, begins in enumerate((eyes, arms)):
             first, left = self.scene.hits(begins, aims)
             is_host = np.isin(first, hosts)
-            free = (first < 0) | is_host
+            free = (first < 0) | (is_host & self._is_nearer_side(begins, aims, left, hosts))
             if row == 1:  # the arm goes up from the body
                 risen, _ = self.scene.hits(np.where(arms[:, 2:] > eyes[:, 2:], eyes, arms), arms)
                 free &= risen < 0
@@ -353,6 +357,19 @@ class _Search:
         best: NDArray[np.float64] = deep.min(axis=0).reshape(n, m).min(axis=1)
         nearest = np.where(in_reach, np.linalg.norm(feet - aims, axis=1), np.inf).reshape(n, m).argmin(axis=1)
         return best, blocker.reshape(n, m)[np.arange(n), nearest]
+
+    def _is_nearer_side(
+        self, begins: NDArray[np.float64], aims: NDArray[np.float64], left: NDArray[np.float64], hosts: Sequence[int]
+    ) -> NDArray[np.bool_]:
+        """Tell which lines go through no more of what holds the target than lies behind the target."""
+        if not hosts:
+            return np.zeros(len(aims), dtype=np.bool_)
+        along = aims - begins
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        along = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+        met, behind = self.scene.only(hosts).hits(aims + along * 2 * _COVER, aims)
+        nearer: NDArray[np.bool_] = (met < 0) | (left <= behind * 1.5 + 0.02)
+        return nearer
 
     def _stand(self, k: int) -> Stand:
         x, y, _ = self.target.destination
@@ -391,9 +408,9 @@ class _Search:
         at = [o.global_id for away, o in on if away == 0 and o.global_id != self.target.global_id]
         return tuple(dict.fromkeys(at))
 
-    def _hidden(self, order: NDArray[np.int64], first: int) -> Miss:
+    def _hidden(self, order: NDArray[np.int64], blockers: Counter[int]) -> Miss:
         near = float(self._distances()[order].min())
-        blocking = (self.scene.elements[first].global_id,) if first >= 0 else ()
+        blocking = tuple(self.scene.elements[k].global_id for k, _ in blockers.most_common(_NAMED))
         what = f"from all {len(order)} free cells in reach, the nearest {near:.2f} m from it, something hides it"
         return Miss(what + self._named(blocking), 0.0, blocking)
 

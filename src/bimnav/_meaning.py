@@ -11,7 +11,10 @@ from bimnav.building import Building, Element
 if TYPE_CHECKING:
     from bimnav.tasks import Choice, Overruled, Task
 
-__all__ = ["Blocking", "what_blocks"]
+__all__ = ["NOT_LISTED", "Blocking", "what_blocks"]
+
+NOT_LISTED = "no obstacle rule of the task matches"
+"""Why an element does not block in a task that lists its obstacles."""
 
 _SOLID = "solid in the robot's height band"
 _DOOR = "a door is passable because it is a door"
@@ -78,7 +81,7 @@ def what_blocks(task: Task, building: Building, targets: Mapping[str, Choice]) -
         if not why_not and not wanted and global_id in figures:
             why_not = f"entourage: {figures[global_id]}"
         if not why_not and not wanted and task.obstacles:
-            why_not = "no obstacle rule of the task matches"
+            why_not = NOT_LISTED
         if why_not:
             left_out[global_id] = why_not
         elif element.shapes:

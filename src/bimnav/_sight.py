@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -13,12 +13,20 @@ from numpy.typing import NDArray
 
 from bimnav.building import Building, Element, Shape
 
-__all__ = ["Scene", "Sight", "points_on", "sight_of"]
+__all__ = ["LIFTED", "UNDER", "Scene", "Sight", "points_on", "sight_of"]
+
+UNDER = 0.6
+"""Metres; so deep one reaches under a floor: into raised floors and pits."""
+LIFTED = 0.1
+"""Metres; floor panels and finishes thinner than this are lifted to reach below them."""
+
 
 _BIG = 0.6  # metres; what has two sides this long hides things, and what is thinner one looks past
 _SKIN = 0.005  # metres; a line ends this far before its point, which may lie on a surface
+_SAME = 1e-6  # metres
+_ON = 0.2 * math.pi  # half of the solid angle a surface fills: 2 pi inside, pi on a face, pi / 4 on a corner
 _MOST_POINTS = 600  # of a shape, from which a few are chosen
-_SEE_THROUGH = frozenset(["IfcDoor", "IfcDoorStandardCase", "IfcSite", "IfcVirtualElement", "IfcAnnotation"])
+_SEE_THROUGH = frozenset(["IfcSite", "IfcVirtualElement", "IfcAnnotation"])
 
 _known: WeakKeyDictionary[Building, Sight] = WeakKeyDictionary()
 
@@ -31,7 +39,7 @@ def sight_of(building: Building) -> Sight:
 
 
 class Sight:
-    """The things of a building that one cannot look or reach through: walls, slabs, cupboards, not doors.
+    """The things of a building that one cannot look or reach through: walls, slabs, cupboards, closed doors.
 
     Parameters
     ----------
@@ -110,24 +118,32 @@ class Scene:
         return first, left
 
     def holding(self, points: NDArray[np.float64]) -> tuple[int, ...]:
-        """Return the indexes of the elements that have one of some points, (n, 3) metres, inside."""
+        """Return the indexes of the elements that have all of some points, (n, 3) metres, inside or on them."""
+        low, high = points.min(axis=0), points.max(axis=0)
         return tuple(
             k
             for k, box in enumerate(self.boxes)
-            if any(
-                (box[0] <= point).all() and (point <= box[1]).all() and self._surrounds(k, point) for point in points
-            )
+            if (box[0] <= low + _SAME).all()
+            and (high - _SAME <= box[1]).all()
+            and all(self._surrounds(k, point) for point in points)
         )
 
+    def only(self, indexes: Sequence[int]) -> Scene:
+        """Return a scene of some of the elements."""
+        parts = [self.triangles[self.offsets[k] : self.offsets[k + 1]] for k in indexes]
+        offsets = np.cumsum([0, *map(len, parts)])
+        triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
+        return Scene(tuple(self.elements[k] for k in indexes), triangles, offsets, self.boxes[list(indexes)])
+
     def _surrounds(self, k: int, point: NDArray[np.float64]) -> bool:
-        """Tell whether a surface winds around a point: by the solid angles of van Oosterom and Strackee (1983)."""
+        """Tell whether a point is in or on a surface: by the solid angles of van Oosterom and Strackee (1983)."""
         triangles = self.triangles[self.offsets[k] : self.offsets[k + 1]]
         a, b, c = (triangles - point).transpose(1, 0, 2)
         to_a, to_b, to_c = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
         ab, bc, ca = (a * b).sum(axis=1), (b * c).sum(axis=1), (c * a).sum(axis=1)
         volume = (a * np.cross(b, c)).sum(axis=1)
         half_angles = np.arctan2(volume, to_a * to_b * to_c + ab * to_c + bc * to_a + ca * to_b)
-        return abs(float(half_angles.sum())) > math.pi
+        return abs(float(half_angles.sum())) > _ON
 
 
 def points_on(shapes: Iterable[Shape], count: int = 12) -> NDArray[np.float64]:

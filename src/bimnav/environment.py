@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
 
+import numpy as np
 import shapely
 
 from bimnav._door_access import DoorAccess, door_access
 from bimnav._doorways import doorway_of
 from bimnav._floors import FLOOR_SOURCES, NEAR, FloorSource, find_floors, outline
 from bimnav._meaning import what_blocks
+from bimnav._sight import LIFTED, UNDER, sight_of
 from bimnav.building import Building, Detection, Element, Issue, Space, Storey
 from bimnav.errors import ValueRangeError
 from bimnav.footprint import Footprint, footprints_of, merge_footprints
@@ -470,7 +472,7 @@ def _found(choice: Choice, environment: IndoorEnvironment) -> Target | None:
         return None
     polygon = outline(product.shapes)
     center = polygon.centroid if polygon.area > 0 else shapely.box(*bounds[0, :2], *bounds[1, :2]).centroid
-    storey = _storey_below(environment, center, float(bounds[0, 2]))
+    storey = _storey_of(environment, product, center)
     destination = (center.x, center.y, environment.levels[storey])
     task = environment.task
     return Target(
@@ -496,6 +498,29 @@ def _storey_below(environment: IndoorEnvironment, point: BaseGeometry, z: float)
     below = [s for s in walkable if environment.levels[s] <= z + NEAR] or walkable[:1]
     under = [s for s in below if environment.floor(s).intersects(point)]
     return (under or below)[-1]
+
+
+def _storey_of(environment: IndoorEnvironment, product: Element | Space, point: BaseGeometry) -> int:
+    """Return the storey from which an element is reached: the one it stands on, or the one above a raised floor.
+
+    What lies close under a floor belongs to it if something hides it from the floor below, and nothing
+    but panels that are lifted hides it from above.
+    """
+    assert product.bounds is not None  # noqa: S101 - the caller has seen to it
+    (low, high), levels = product.bounds[:, 2].tolist(), environment.levels
+    below = _storey_below(environment, point, low)
+    over = [s for s, level in enumerate(levels) if 0 <= level - high <= UNDER and s != below]
+    over = [s for s in over if environment.floor(s).intersects(point)]
+    if not over or levels[below] > low:
+        return below
+    above, sight = min(over, key=lambda s: levels[s]), sight_of(environment.building)
+    x, y = point.x, point.y
+    feet, bottom, top, head = (np.array([[x, y, z]]) for z in (levels[below] + NEAR, low, high, levels[above] + 1.0))
+    scene = sight.within(np.array([feet[0], head[0]]), {product.global_id})
+    thin = [e.global_id for e, box in zip(scene.elements, scene.boxes, strict=True) if box[1, 2] - box[0, 2] <= LIFTED]
+    is_hidden = scene.hits(feet, bottom)[0][0] >= 0
+    lifted = sight.within(np.array([feet[0], head[0]]), {product.global_id, *thin})
+    return above if is_hidden and lifted.hits(head, top)[0][0] < 0 else below
 
 
 def _placed(detection: Detection, environment: IndoorEnvironment, home: int | None) -> Target:
