@@ -293,7 +293,7 @@ class _Search:
     @cached_property
     def scene(self) -> Scene:
         """What may hide the target, as far as the robot reaches."""
-        corners = np.concatenate([self.points, self.centers])  # without any cell, nothing is looked at
+        corners = np.concatenate([self.points, self.centers])
         box = np.array([corners.min(axis=0), corners.max(axis=0)])
         box[0, 2] = min(box[0, 2], self.level)
         box[1, 2] = max(box[1, 2], self.level + self.robot.height)
