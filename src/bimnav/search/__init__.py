@@ -6,12 +6,14 @@ from bimnav.search.exact import share_out, trace_visits, visit_table
 from bimnav.search.layout import Layout
 from bimnav.search.mesh import Mesh, mesh_of_mask, mesh_of_triangles
 from bimnav.search.ordering import Ordering, is_small, order_few, order_groups, order_rows
+from bimnav.search.repair import Field
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import Taut, find_taut
 from bimnav.search.transform import clearances
 from bimnav.search.warmup import warmup
 
 __all__ = [
+    "Field",
     "Found",
     "Layout",
     "Mesh",

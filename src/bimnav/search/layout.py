@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bimnav.search.compiled import lean
 
-__all__ = ["COL_STEP", "HUB", "ROW_STEP", "SEES", "Layout"]
+__all__ = ["COL_STEP", "HUB", "ROW_STEP", "SEES", "Layout", "moves_at"]
 
 COL_STEP = (1, 0, -1, 0, 1, -1, -1, 1)
 ROW_STEP = (0, 1, 0, -1, 1, 1, -1, -1)
@@ -81,6 +81,20 @@ _IS_STOP[0] = 15
 
 
 @lean
+def moves_at(cost: NDArray[np.float32], i: int, stride: int) -> int:
+    """Return the moves out of a free cell, as bits."""
+    found: int
+    east, west = cost[i + 1] < np.inf, cost[i - 1] < np.inf
+    north, south = cost[i + stride] < np.inf, cost[i - stride] < np.inf
+    found = east | north << 1 | west << 2 | south << 3
+    found |= (north & east & (cost[i + stride + 1] < np.inf)) << 4
+    found |= (north & west & (cost[i + stride - 1] < np.inf)) << 5
+    found |= (south & west & (cost[i - stride - 1] < np.inf)) << 6
+    found |= (south & east & (cost[i - stride + 1] < np.inf)) << 7
+    return found
+
+
+@lean
 def _find_moves(cost: NDArray[np.float32], moves: NDArray[np.uint16], stride: int) -> tuple[float, float]:
     """Fill in the moves out of every cell; return the least and the greatest finite cost."""
     least, greatest = np.inf, 0.0
@@ -89,14 +103,7 @@ def _find_moves(cost: NDArray[np.float32], moves: NDArray[np.uint16], stride: in
             continue
         least = min(least, cost[i])
         greatest = max(greatest, cost[i])
-        east, west = cost[i + 1] < np.inf, cost[i - 1] < np.inf
-        north, south = cost[i + stride] < np.inf, cost[i - stride] < np.inf
-        found = east | north << 1 | west << 2 | south << 3
-        found |= (north & east & (cost[i + stride + 1] < np.inf)) << 4
-        found |= (north & west & (cost[i + stride - 1] < np.inf)) << 5
-        found |= (south & west & (cost[i - stride - 1] < np.inf)) << 6
-        found |= (south & east & (cost[i - stride + 1] < np.inf)) << 7
-        moves[i] = found
+        moves[i] = moves_at(cost, i, stride)
     return least, greatest
 
 
