@@ -15,7 +15,7 @@ extensions = [
 ]
 html_theme = "furo"
 html_title = f"bimnav {version}"
-exclude_patterns = ["_build", "benchmarks/*"]  # parts of benchmarks.md, written by the scripts
+exclude_patterns = ["_build", "benchmarks/*", "tasks/found/*"]  # parts of pages, written by the scripts
 
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True

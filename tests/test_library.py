@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter, defaultdict
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -12,9 +14,12 @@ import pytest
 import bimnav as bn
 from bimnav.building import Building, Element, Space, Storey
 from bimnav.tasks import match
-from tests.conftest import real_model
+from tests.conftest import REPOSITORY, real_model
 
 LABELS = Path(__file__).with_name("labels.csv")
+COUNTS = Path(__file__).with_name("task_counts.csv")
+PAGES = sorted((REPOSITORY / "docs" / "tasks").glob("*.md"))
+OBSTACLES = "obstacles"  # stands for a task among the counts
 
 # Each label is what someone who reads the element's names, type, properties and geometry would call it.
 ROOMS = (
@@ -54,6 +59,11 @@ def labels() -> dict[str, dict[str, set[str]]]:
 @cache
 def building(model: str) -> Building:
     return bn.read_ifc(real_model(model))
+
+
+@cache
+def environment(model: str) -> bn.IndoorEnvironment:
+    return bn.make_environment(building(model), bn.Task("look"), bn.Robot(radius=0.25))
 
 
 def found_by(task: str, model: str) -> set[str]:
@@ -98,6 +108,33 @@ def test_over_all_tasks_precision_and_recall_are_higher_still():
     counts = sum((outcomes(task) for task in WANTED), Counter())
     assert counts["hit"] / (counts["hit"] + counts["alarm"]) > 0.99
     assert counts["hit"] / (counts["hit"] + counts["miss"]) > 0.99
+
+
+def counted() -> list[tuple[str, str, int]]:
+    """Return model, task and how many targets are to be found: as counted by hand, or otherwise if noted so."""
+    with COUNTS.open(encoding="utf-8") as file:
+        listed = {(row["model"], row["task"]): row["found"] or row["count"] for row in csv.DictReader(file)}
+    models = sorted({model for model, _ in listed})
+    numbers = [(model, task, listed.get((model, task), "0")) for model in models for task in (*WANTED, OBSTACLES)]
+    return [(model, task, int(number)) for model, task, number in numbers if number]
+
+
+@pytest.mark.parametrize("model", sorted({model for model, _, _ in counted()}))
+def test_as_many_targets_and_obstacles_are_found_as_were_counted_by_hand(model):
+    found = {task: len(found_by(task, model)) for task in WANTED}
+    found[OBSTACLES] = len({obstacle.global_id for obstacle in environment(model).obstacles})
+    numbers = {task: number for name, task, number in counted() if name == model}
+    assert {task: found[task] for task in numbers} == numbers
+
+
+@pytest.mark.parametrize("model", sorted({model for model, _, _ in counted()}))
+def test_no_door_opening_or_room_blocks_in_a_real_model(model):
+    blocking = {obstacle.global_id for obstacle in environment(model).obstacles}
+    house = building(model)
+    passable = {door.global_id for door in house.doors} | {space.global_id for space in house.spaces}
+    passable |= {opening.global_id for opening in house.openings}
+    passable |= {global_id for global_id, label in labels()[model].items() if "door" in label}
+    assert not blocking & passable
 
 
 # names as exporters write them: class, name, type name; and what the task is to make of them
@@ -245,3 +282,21 @@ def test_a_task_is_not_misled_by_words(case):
     task, *thing = case
     rules = [rule for rule in bn.load_task(task).targets if "PredefinedType" not in rule.filter]
     assert not [hit.why for rule in rules for hit in match(rule, one(*thing))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_task_files_shown_in_the_documentation_can_be_loaded(page, tmp_path):
+    for text in re.findall(r"^```toml\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE):
+        path = tmp_path / "shown.toml"
+        path.write_text(text, encoding="utf-8")
+        task = bn.load_task(path)
+        assert task.targets or task.restricted
+        for rule in (*task.targets, *task.restricted):
+            match(replace(rule, expect="", spaces=()), one("IfcDoor", "Door", ""))
+
+
+def test_every_task_has_a_page_that_shows_its_file():
+    assert {task.name for task in bn.list_tasks()} <= {page.stem for page in PAGES}
+    for task in bn.list_tasks():
+        page = REPOSITORY / "docs" / "tasks" / f"{task.name}.md"
+        assert f"library/{task.name}.toml" in page.read_text(encoding="utf-8")
