@@ -1,4 +1,4 @@
-"""Bodies bounded by flat faces between straight edges, read from the text of the model past the geometry kernel.
+"""Bodies read past the geometry kernel: those of flat faces between straight edges, from the text of the model.
 
 They are most of what a kernel spends its time on, and need none of its art.
 """
@@ -16,12 +16,14 @@ from bimnav.errors import GeometryError
 from bimnav.footprint import triangulate
 from bimnav.ifc._clips import Clipper
 from bimnav.ifc._kernel import Entity, check_size
+from bimnav.ifc._pipes import Pipes
 from bimnav.ifc._products import is_body
 from bimnav.ifc._step import divide, gather, index
 
 __all__ = ["Bodies", "Facets"]
 
 _FACETED = frozenset(["IfcFacetedBrep", "IfcFaceBasedSurfaceModel", "IfcShellBasedSurfaceModel"])
+_FLAT, _ROUND, _OTHER = range(3)
 _MANY = 100  # parts of a body; more are better joined by the kernel
 
 Matrix = NDArray[np.float64]
@@ -100,13 +102,23 @@ def _normal_of(ring: NDArray[np.float64]) -> NDArray[np.float64]:
     return normal
 
 
+def _together(meshes: Sequence[Mesh]) -> Mesh:
+    if len(meshes) == 1:
+        return meshes[0]
+    firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + first for mesh, first in zip(meshes, firsts, strict=False)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
 class Bodies:
-    """Reads products of whose bodies a part is faceted; the other parts come one by one from the kernel.
+    """Reads products of whose bodies a part is faceted or round; the other parts come one by one from the kernel.
 
     Parameters
     ----------
     facets
         Reads the faceted parts.
+    pipes
+        Reads the round ones.
     clipper
         Reads placements and the other parts.
     solids
@@ -120,19 +132,20 @@ class Bodies:
     def __init__(
         self,
         facets: Facets,
+        pipes: Pipes,
         clipper: Clipper,
         solids: Mapping[int, Sequence[Entity]],
         unit_scale: float,
         keep: Callable[[Mesh], int],
     ) -> None:
-        self._facets, self._clipper, self._solids = facets, clipper, solids
+        self._facets, self._pipes, self._clipper, self._solids = facets, pipes, clipper, solids
         self._unit_scale, self._keep = unit_scale, keep
         self._known: dict[int, list[Placed] | None] = {}
-        self._class: dict[int, str] = {}
+        self._kinds: dict[int, int] = {}
 
-    def is_faceted(self, product: Entity) -> bool:
-        """Tell whether there is anything faceted in a product's body."""
-        return any(self._class_of(item) in _FACETED for item in self._solids[product.id()])
+    def has_any(self, product: Entity) -> bool:
+        """Tell whether there is anything faceted or round in a product's body."""
+        return any(self._kind_of(item) is not _OTHER for item in self._solids[product.id()])
 
     def read(self, product: Entity) -> list[Placed] | None:
         """Return the bodies of a product, in the world; None if the kernel must read it."""
@@ -147,11 +160,13 @@ class Bodies:
             return None
         return [(mesh, placement @ where) for part in parts for mesh, where in part or ()]
 
-    def _class_of(self, item: Entity) -> str:
+    def _kind_of(self, item: Entity) -> int:
         step_id = item.id()
-        if step_id not in self._class:
-            self._class[step_id] = item.is_a()
-        return self._class[step_id]
+        if step_id not in self._kinds:
+            name = item.is_a()
+            is_round = name not in _FACETED and self._pipes.can_read(item, name)
+            self._kinds[step_id] = _FLAT if name in _FACETED else _ROUND if is_round else _OTHER
+        return self._kinds[step_id]
 
     def _parts(self, representation: Entity, wanted: set[int]) -> list[Placed] | None:
         step_id = representation.id()
@@ -160,16 +175,18 @@ class Bodies:
         return self._known[step_id]
 
     def _read(self, representation: Entity, wanted: set[int]) -> list[Placed] | None:
-        found: list[Placed] = []
-        mapped = [item for item in representation.Items if self._class_of(item) == "IfcMappedItem"]
         plain = [item for item in representation.Items if item.id() in wanted]
-        faceted = [item for item in plain if self._class_of(item) in _FACETED]
+        faceted = [item for item in plain if self._kind_of(item) is _FLAT]
         meshes = [self._facets.read(faceted)] if faceted else []
-        meshes += [self._clipper.plain(item) for item in plain if self._class_of(item) not in _FACETED]
-        for mesh in meshes:
-            if mesh is None or not len(mesh.faces):
-                return None
-            found.append((self._keep(mesh), np.eye(4)))
+        for item in plain:
+            kind = self._kind_of(item)
+            if kind is not _FLAT:
+                meshes.append(self._pipes.read(item) if kind is _ROUND else self._clipper.plain(item))
+        made = [mesh for mesh in meshes if mesh is not None and len(mesh.faces)]
+        if len(made) < len(meshes):
+            return None
+        found: list[Placed] = [(self._keep(_together(made)), np.eye(4))] if made else []
+        mapped = [item for item in representation.Items if item.is_a() == "IfcMappedItem"]
         for item in mapped:
             to_product = self._mapping(item)
             parts = self._parts(item.MappingSource.MappedRepresentation, wanted)

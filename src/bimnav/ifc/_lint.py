@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
 import lark
@@ -36,6 +37,7 @@ class Finding(NamedTuple):
     schema: str = ""
 
 
+@lru_cache
 def parse(query: str) -> Any:
     """Return the tree of a query.
 
@@ -47,6 +49,7 @@ def parse(query: str) -> Any:
     return filter_elements_grammar.parse(query)
 
 
+@lru_cache
 def lint(query: str, schema: str = "") -> tuple[Finding, ...]:
     """Return what there is to say of a query, by column; for one schema, if one is given, else for any."""
     try:

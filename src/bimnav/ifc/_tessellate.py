@@ -18,7 +18,9 @@ from bimnav.ifc._canonical import canonical
 from bimnav.ifc._clips import Clipper
 from bimnav.ifc._facets import Bodies, Facets
 from bimnav.ifc._kernel import FAST, THOROUGH, Entity, File, iterate, mesh_of, new_log, settings_for
+from bimnav.ifc._pipes import Pipes
 from bimnav.ifc._products import is_body
+from bimnav.ifc._units import angle_unit
 
 __all__ = ["Reading", "Tessellator"]
 
@@ -103,11 +105,11 @@ class Tessellator:
     def read(self, products: Sequence[Entity]) -> dict[int, Reading]:
         """Tessellate products without cutting their openings.
 
-        Faceted bodies do not go to a kernel. What the fast one drops, leaves incomplete or complains about
+        Faceted bodies and pipes do not go to a kernel. What the fast one drops, leaves incomplete or complains about
         is clipped by our own means or handed to the thorough one; the better of the two readings counts.
         """
         trusted = [product for product in products if product.id() not in self._thorough]
-        readings = {product.id(): Reading() for product in products} | self._read_faceted(trusted)
+        readings = {product.id(): Reading() for product in products} | self._read_past(trusted)
         readings |= self._iterate([p for p in trusted if not readings[p.id()].shapes], FAST)
         doubtful = [product for product in products if not self._is_complete(product, readings)]
         clipped = self._clip_all([product for product in doubtful if product.id() not in self._thorough])
@@ -191,15 +193,16 @@ class Tessellator:
             self.meshes.append(mesh)
         return self._index[content]
 
-    def _read_faceted(self, products: Sequence[Entity]) -> dict[int, Reading]:
-        """Read those of the products that have faceted bodies, perhaps beside others."""
+    def _read_past(self, products: Sequence[Entity]) -> dict[int, Reading]:
+        """Read those of the products that have faceted or round bodies, perhaps beside others."""
         readings: dict[int, Reading] = {}
         if self._facets is None:
             return readings
         clipper = Clipper(self.file, settings_for(self._contexts))
-        bodies = Bodies(self._facets, clipper, self._solids, self._unit_scale, self._keep)
+        pipes = Pipes(clipper, self._unit_scale, angle_unit(self.file))
+        bodies = Bodies(self._facets, pipes, clipper, self._solids, self._unit_scale, self._keep)
         for product in products:
-            if not bodies.is_faceted(product):
+            if not bodies.has_any(product):
                 continue
             self._working_on(product.id())
             placed = bodies.read(product)

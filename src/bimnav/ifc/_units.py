@@ -9,7 +9,7 @@ from ifcopenshell.util.unit import calculate_unit_scale
 from bimnav.errors import IfcStructureError, IfcUnitsError
 from bimnav.ifc._kernel import File
 
-__all__ = ["length_unit"]
+__all__ = ["angle_unit", "length_unit"]
 
 _RANGE = (1e-6, 1e4)  # metres per unit: a micrometre to ten kilometres
 
@@ -42,3 +42,11 @@ def length_unit(file: File) -> tuple[str, float]:
             f"the length unit {name!r} is {scale:.6g} m.", "Export in metres, millimetres or feet.", {"scale": scale}
         )
     return name, scale
+
+
+def angle_unit(file: File) -> float:
+    """Return the radians of the file's angle unit; nan if it cannot be read."""
+    try:
+        return float(calculate_unit_scale(file, "PLANEANGLEUNIT"))
+    except (AttributeError, KeyError, RuntimeError, TypeError, ValueError):
+        return math.nan
