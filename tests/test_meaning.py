@@ -1,13 +1,16 @@
 """What blocks by meaning, which rule decides, and how doors are."""
 
+import json
 import math
 
+import numpy as np
 import pytest
 
 from bimnav.building import Building, Door, Element, Mesh, Shape, Space, Storey
 from bimnav.environment import make_environment
-from bimnav.errors import TaskError
+from bimnav.errors import GridError, ModelError, TaskError
 from bimnav.graph import build_graph
+from bimnav.grid import Cell
 from bimnav.ifc import read_ifc
 from bimnav.robot import Robot
 from bimnav.tasks import Rule, Task
@@ -207,3 +210,99 @@ def test_no_door_opening_or_room_of_a_real_model_blocks(name):
     never |= {opening.global_id for opening in building.openings}
     assert environment.obstacles
     assert not never & blocking(environment)
+
+
+# explaining
+
+
+def explained_room():
+    table = Element(
+        "table", "IfcFurniture", "Table", shapes=(*block(1, 1, 0.7, 2, 1, 0.05), *block(1, 1, 0, 0.1, 0.1, 0.7))
+    )
+    mat = Element("mat", "IfcCovering", "Mat", shapes=block(1.5, 1.2, 0, 0.5, 0.5, 0.01))
+    chair = Element("chair", "IfcFurniture", "Chair", shapes=block(4, 4, 0, 0.5, 0.5, 0.9))
+    building = room_with(table, mat, chair).with_targets([("spill", 2.1, 1.3)])
+    task = Task(
+        "look",
+        targets=[Rule("IfcFurniture", ["chair"], label="chairs", source="my.toml:4")],
+        ignore=[Rule("IfcFurniture", ["chair"], label="soft", source="my.toml:9")],
+        obstacles=[Rule("IfcFurniture", label="furniture", source="my.toml:12")],
+        avoid=[
+            Rule("IfcSpace", label="hall", factor=3, source="my.toml:20"),
+            Rule("IfcSpace", label="all", factor=9, source="my.toml:24"),
+        ],
+    )
+    return make_environment(building, task, Robot(radius=0.1, height=0.5))
+
+
+def test_an_environment_explains_what_an_element_is_to_the_task():
+    environment = explained_room()
+    table = environment.explain("table")
+    [legs] = table.reasons
+    assert (legs.role, legs.storey, legs.low, legs.high, legs.cost) == ("obstacle", 0, 0.05, 0.5, math.inf)
+    assert [(p.kind, p.label, p.source, p.decides) for p in legs.picked_by] == [
+        ("obstacles", "furniture", "my.toml:12", True)
+    ]
+    chair = environment.explain("chair")
+    assert [reason.role for reason in chair.reasons] == ["left out", "target"]
+    assert [pick.source for pick in chair.reasons[0].picked_by] == ["my.toml:12", "my.toml:9"]
+    assert [reason.role for reason in environment.explain("room").reasons] == ["avoid", "floor"]
+    assert environment.explain("mat").reasons[0].rule == "no obstacle rule of the task matches"
+    spill = environment.building.detections[0].global_id
+    assert [(r.role, r.rule) for r in environment.explain(spill).reasons] == [("target", "placed by the user")]
+    assert repr(environment.explain("room")).split("\n") == [
+        "IfcSpace '1' (room)",
+        "  avoid: storey 0, 0.000 to 3.000 m, cost 3",
+        "      rule 'hall' (my.toml:20): IfcSpace passes the filter 'IfcSpace'",
+        "      gives way: rule 'all' (my.toml:24): IfcSpace passes the filter 'IfcSpace'",
+        "  floor: storey 0, 0.000 to 3.000 m",
+        "      walkable floor of a space",
+    ]
+    json.dumps(table.to_dict(), allow_nan=False)
+    with pytest.raises(ModelError, match="'nobody'"):
+        environment.explain("nobody")
+
+
+def test_a_graph_explains_a_cell_by_everything_that_touches_it():
+    graph = build_graph(explained_room(), cell_size=0.2)
+    at = graph.frame.cell_at
+    leg = graph.explain(at(1.05, 1.05))
+    assert leg.summary == "blocked by Table (table)"
+    assert (leg.reasons[0].role, leg.reasons[0].rule) == (
+        "obstacle",
+        "rule 'furniture' (my.toml:12): IfcFurniture passes the filter 'IfcFurniture'",
+    )
+    beside = graph.explain(at(1.25, 1.05))
+    assert beside.reasons[0].rule.endswith("the cell lies within the robot's radius of it")
+    under = graph.explain(at(2.1, 1.3))
+    assert under.summary == "free, cost 3, because of 1 (room)"
+    assert {(reason.role, reason.name) for reason in under.reasons} == {
+        ("above", "Table"),
+        ("avoid", "1"),
+        ("floor", "1"),
+        ("target", "spill"),
+    }
+    assert graph.explain(at(1.7, 1.3)).reasons[1].role == "left out"  # the mat
+    edge = graph.explain(at(0.01, 3))
+    assert (edge.summary, edge.is_floor) == ("not wholly on walkable floor", False)
+    closed = graph.block([at(5, 5)]).explain(at(5, 5))
+    assert closed.summary == "closed since the graph was built"
+    assert repr(leg).startswith(
+        "Cell(storey=0, row=6, col=6) on Ground, x 1.000 to 1.200 m, y 1.000 to 1.200 m: blocked"
+    )
+    json.dumps([each.to_dict() for each in (leg, under, edge)], allow_nan=False)
+    with pytest.raises(GridError):
+        graph.explain((0, 999, 0))
+
+
+def test_the_explanation_of_a_cell_agrees_with_the_graph_on_a_real_model():
+    building = read_ifc(real_model("houses/SampleHouse4.ifc"))
+    graph = build_graph(make_environment(building, Task("any"), Robot(radius=0.2)), cell_size=0.3)
+    rng = np.random.default_rng(5)
+    rows, cols = graph.frame.shape[1:]
+    for row, col in zip(rng.integers(rows, size=60).tolist(), rng.integers(cols, size=60).tolist(), strict=True):
+        cell = Cell(graph.frame.ground, row, col)
+        told = graph.explain(cell)
+        obstacles = {reason.global_id for reason in told.reasons if reason.role == "obstacle"}
+        assert bool(obstacles) == bool(graph.obstacle[cell]), cell
+        assert told.summary.startswith("free") == bool(graph.free[cell]), cell

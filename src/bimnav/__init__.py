@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bimnav._door_access import DoorAccess as DoorAccess
+    from bimnav._explain import CellExplanation as CellExplanation, Explanation as Explanation, Reason as Reason
     from bimnav._georeference import Georeference as Georeference
     from bimnav._start import Start as Start, find_start as find_start
     from bimnav.assets import Asset as Asset
@@ -104,6 +105,7 @@ _HOMES = {
     "bimnav.ifc": "read_ifc",
     "bimnav.inspection": "inspect",
     "bimnav._door_access": "DoorAccess",
+    "bimnav._explain": "CellExplanation Explanation Reason",
     "bimnav._georeference": "Georeference",
     "bimnav._start": "Start find_start",
     "bimnav.ifc._federate": "federate",

@@ -27,6 +27,7 @@ Place: TypeAlias = Sequence[Any]
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
+    from bimnav._explain import Explanation
     from bimnav.tasks import Choice, Destination, Overruled, Task
 
 __all__ = ["IndoorEnvironment", "Obstacle", "Place", "Region", "Target", "Zone", "make_environment", "rules_overruled"]
@@ -273,6 +274,18 @@ class IndoorEnvironment:
         changed.__dict__.update(_floors=self._floors, _bodies=tuple(bodies))
         return changed
 
+    def explain(self, global_id: str) -> Explanation:
+        """Say what an element, room or detection is to the task, on every storey, and the rule that decides.
+
+        Raises
+        ------
+        ModelError
+            If there is nothing of this GlobalId.
+        """
+        from bimnav._explain import explain_element
+
+        return explain_element(self, global_id)
+
     def is_clear(self, storey: int, *points: Sequence[float]) -> bool:
         """Tell whether the robot can be on a point, or drive straight from point to point, touching nothing."""
         at = shapely.Point(*points[0][:2]) if len(points) == 1 else shapely.LineString([p[:2] for p in points])
@@ -360,7 +373,7 @@ def make_environment(
         obstacles,
         targets=(),
         zones=zones,
-        left_out=tuple(sorted(blocks.left_out.items())),
+        left_out=tuple(sorted((g, why) for g, why in blocks.left_out.items() if g not in blocking)),
         outside_bands=tuple(e.global_id for e, _ in blocks.candidates if e.global_id not in blocking),
         issues=issues,
         doors=access,

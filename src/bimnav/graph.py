@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import rustworkx
     from shapely.geometry.base import BaseGeometry
 
+    from bimnav._explain import CellExplanation
     from bimnav.environment import IndoorEnvironment, Target
 
 __all__ = ["Conflict", "NavGraph", "NodeKind", "Objective", "Stop", "Unreached", "build_graph"]
@@ -452,6 +453,18 @@ class NavGraph:
     def with_objective(self, objective: Objective) -> Self:
         """Return the graph whose paths make something else least."""
         return self if objective == self.objective else replace(self, objective=objective)
+
+    def explain(self, cell: Cell) -> CellExplanation:
+        """Say what a cell is: every element that touches it, the rule that decides, heights and costs.
+
+        Raises
+        ------
+        GridError
+            If there is no such cell.
+        """
+        from bimnav._explain import explain_cell
+
+        return explain_cell(self, cell)
 
     def edges(self) -> Edges:
         """Return all edges once: flat indexes of their two cells, and their cost.

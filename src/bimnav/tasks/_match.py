@@ -13,10 +13,10 @@ from bimnav._classification import classifications_of, is_below
 from bimnav.building import Building, Element, Facts, Space
 from bimnav.errors import ModelError, SelectorError, TaskError
 from bimnav.tasks._conditions import parse_condition
-from bimnav.tasks._task import Rule
+from bimnav.tasks._task import RULE_LISTS, Rule, Task
 from bimnav.tasks._words import folded, haystack, needle
 
-__all__ = ["Match", "filtered", "find", "match", "told"]
+__all__ = ["Match", "filtered", "find", "match", "rules_for", "told"]
 
 Product: TypeAlias = Element | Space
 Test: TypeAlias = Callable[[Product], "str | None"]  # None: fails; else why it holds, or nothing to say
@@ -60,9 +60,22 @@ def find(rule: Rule, building: Building) -> tuple[Match, ...]:
     for product in filtered(rule, building):
         reasons = _reasons(product, tests)
         if reasons is not None:
-            why = ", ".join(filter(None, reasons)) or f"{product.ifc_class} passes the filter {rule.filter!r}"
-            found.append(Match(product, f"{told(rule)}: {why}"))
+            found.append(Match(product, f"{told(rule)}: {_joined(reasons, product, rule)}"))
     return tuple(found)
+
+
+def rules_for(task: Task, product: Product, building: Building) -> Iterator[tuple[str, Rule, str]]:
+    """Yield every rule of a task that picks a product: the list it stands in, the rule, and what makes it."""
+    for kind in RULE_LISTS:
+        for rule in getattr(task, kind):
+            if product in filtered(rule, building):
+                reasons = _reasons(product, [make(rule, building) for make in _TESTS])
+                if reasons is not None:
+                    yield kind, rule, _joined(reasons, product, rule)
+
+
+def _joined(reasons: Iterable[str], product: Product, rule: Rule) -> str:
+    return ", ".join(filter(None, reasons)) or f"{product.ifc_class} passes the filter {rule.filter!r}"
 
 
 def _reasons(product: Product, tests: Iterable[Test]) -> list[str] | None:
