@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from bimnav._explain import CellExplanation as CellExplanation, Explanation as Explanation, Reason as Reason
     from bimnav._georeference import Georeference as Georeference
     from bimnav._start import Start as Start, find_start as find_start
+    from bimnav._why import NoRoute as NoRoute, why_unreachable as why_unreachable
     from bimnav.assets import Asset as Asset
     from bimnav.building import (
         Building as Building,
@@ -107,6 +108,7 @@ _HOMES = {
     "bimnav._door_access": "DoorAccess",
     "bimnav._explain": "CellExplanation Explanation Reason",
     "bimnav._georeference": "Georeference",
+    "bimnav._why": "NoRoute why_unreachable",
     "bimnav._start": "Start find_start",
     "bimnav.ifc._federate": "federate",
     "bimnav.links": "Link RefusedConnector",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bimnav._connectors import Ascent
 from bimnav._gates import DoorCheck, Gates, listed
+from bimnav._why import FIXED
 from bimnav.building import Door, Element
 from bimnav.footprint import unite
 from bimnav.graph import NavGraph
@@ -31,18 +32,6 @@ Window: TypeAlias = tuple[slice, slice]
 _LEAST_PART = 0.5  # square metres of standing room; less is a pocket between furniture
 _NEAR_ENTRY = 1.0  # metres from the entry of a stair to the floor it leads from
 _SAME_LEVEL = 0.35  # metres between the height of that entry and of that floor
-_FIXED = (
-    "IfcWall",
-    "IfcCurtainWall",
-    "IfcPlate",
-    "IfcMember",
-    "IfcWindow",
-    "IfcColumn",
-    "IfcSlab",
-    "IfcRoof",
-    "IfcStair",
-    "IfcRailing",
-)
 
 
 class Obstruction(NamedTuple):
@@ -268,7 +257,7 @@ class Reach:
         rows, cols = np.nonzero(cells)
         d, (x0, y0) = self.frame.cell_size, self.frame.origin
         tree = shapely.STRtree(shapely.points(x0 + (cols + 0.5) * d, y0 + (rows + 0.5) * d))
-        movable = ((o, body) for o, body in self.environment.bodies_on(storey) if not o.ifc_class.startswith(_FIXED))
+        movable = ((o, body) for o, body in self.environment.bodies_on(storey) if not o.ifc_class.startswith(FIXED))
         near = [o for o, body in movable if len(tree.query(body, predicate="dwithin", distance=2 * d))]
         names = listed(o.name or o.ifc_class for o in near)
         return obstruction("furniture", f"{names} stand in the way", (o.global_id for o in near))
@@ -280,7 +269,7 @@ class Reach:
 
         masks = []
         for storey, main in enumerate(self.main):
-            fixed = [b for o, b in self.environment.bodies_on(storey) if o.ifc_class.startswith(_FIXED)]
+            fixed = [b for o, b in self.environment.bodies_on(storey) if o.ifc_class.startswith(FIXED)]
             labels = ndimage.label(self._floor[storey] & ~rasterize(self.frame, fixed))[0]
             masks.append((labels == labels[self.parts[storey] == main][0]) & bool(main))
         return tuple(masks)

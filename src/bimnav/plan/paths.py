@@ -7,13 +7,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bimnav import search
+from bimnav._why import why_unreachable
 from bimnav.errors import (
     GoalBlockedError,
     InputError,
@@ -344,11 +345,12 @@ def _cell(graph: NavGraph, index: int) -> Cell:
 
 def _no_path(graph: NavGraph, begin: int, end: int) -> NoPathError:
     start, goal = _cell(graph, begin), _cell(graph, end)
-    return NoPathError(
-        f"no path from {start} to {goal}; both cells must be free and connected",
-        "",
-        {"start": tuple(start), "goal": tuple(goal)},
-    )
+    context: dict[str, Any] = {"start": tuple(start), "goal": tuple(goal)}
+    reason = "both cells must be free and connected"
+    if graph.environment is not None and (why := why_unreachable(graph, start, goal)) is not None:
+        reason = why.message
+        context |= {"reason": why.reason, "global_ids": list(why.global_ids), "shortage": why.shortage}
+    return NoPathError(f"no path from {start} to {goal}; {reason}", "", context)
 
 
 def _find_explicit(graph: NavGraph, begin: int, end: int, algorithm: Algorithm) -> Path:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav._why import why_unreachable
 from bimnav.errors import InputError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
@@ -208,6 +209,7 @@ def plan_tour(
             cells = tuple(stand.cell for stand in places)
             due = math.inf if stop.due is None else stop.due
             found.setdefault((cells, stop.priority, due), []).append(stop)
+    unreached = explained(graph, start, unreached)
     ordered = _ordered(graph, start, end, list(found.items()), robot, return_to_start)
     for stop in ordered.late:
         reason = f"it cannot be done within {stop.due:g} s of the start"
@@ -373,6 +375,21 @@ def _charged(
         if done < count:
             along.append(visits[done])
     return tuple(along), tuple(charges), visits[count:]
+
+
+def explained(graph: NavGraph, start: Cell, unreached: Iterable[Unreached]) -> list[Unreached]:
+    """Add to what lies in another part of a building why no way leads there; asked once for each part."""
+    known: dict[int, str] = {}
+    found = []
+    for lost in unreached:
+        part = int(graph.components[lost.cell]) if lost.cell is not None and lost.cell in graph.frame else 0
+        if lost.cell is not None and part not in (0, graph.components[start]) and graph.environment is not None:
+            if part not in known:
+                why = why_unreachable(graph, start, lost.cell)
+                known[part] = f": {why.message}" if why else ""
+            lost = replace(lost, reason=lost.reason + known[part])
+        found.append(lost)
+    return found
 
 
 def why_unreached(graph: NavGraph, start: Cell, cell: Cell) -> str:
