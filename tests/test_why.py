@@ -88,6 +88,11 @@ def test_a_stair_that_the_robot_does_not_climb_is_named_with_the_reason():
     assert found.message == "the way leads over stair Stair (connector): the robot climbs no stairs"
 
 
+def test_a_lift_that_the_robot_does_not_use_is_no_obstacle_to_remove():
+    found = why(graph_of(two_storeys("lift"), uses_lifts=False), (1, 3), (1, 3), (0, 1))
+    assert found.message == "the way leads over lift Lift (connector): the robot does not ride in lifts"
+
+
 def test_closed_cells_and_restricted_zones_are_named():
     graph = graph_of(two_rooms())
     storey, _, _ = graph.frame.cell_at(1, 2)

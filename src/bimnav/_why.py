@@ -133,7 +133,7 @@ class _Barrier(NamedTuple):
 
 
 def _blocked(barriers: Sequence[_Barrier]) -> NoRoute:
-    ids = tuple(barrier.global_id for barrier in barriers if barrier.global_id)
+    ids = tuple(dict.fromkeys(barrier.global_id for barrier in barriers if barrier.global_id))
     unfit = [barrier for barrier in barriers if barrier.why]
     if unfit:
         text = "; ".join(f"{barrier.label}: {barrier.why}" for barrier in unfit)
@@ -146,10 +146,10 @@ def _blocked(barriers: Sequence[_Barrier]) -> NoRoute:
 def _apart(graph: NavGraph, start: Cell, goal: Cell, barriers: Sequence[_Barrier]) -> NoRoute:
     elements = [barrier for barrier in barriers if barrier.global_id]
     if elements and all(barrier.price < _NO_FLOOR for barrier in barriers):
-        names = ", ".join(barrier.label for barrier in elements)
-        return NoRoute(
-            "apart", f"no door or passage leads past {names}", tuple(barrier.global_id for barrier in elements)
-        )
+        text = f"no door or passage leads past {', '.join(b.label for b in elements if b.price >= _STRUCTURE)}"
+        others = [barrier for barrier in barriers if barrier.price < _STRUCTURE]
+        text += f", and {_blocked(others).message}" if others else ""
+        return NoRoute("apart", text, tuple(dict.fromkeys(barrier.global_id for barrier in elements)))
     if start.storey != goal.storey:
         return NoRoute("apart", "no stair, ramp or lift that was found joins their storeys")
     sizes = [int((graph.components == graph.components[cell]).sum()) for cell in (start, goal)]
@@ -191,7 +191,7 @@ class _Map:
             self._join_refused(graph, graph.environment)
 
     def _number(self, barrier: _Barrier) -> int:
-        key = barrier.global_id or barrier.name
+        key = f"{barrier.global_id}, not used" if barrier.why else barrier.global_id or barrier.name
         if key not in self._numbers:
             self._numbers[key] = len(self.barriers)
             self.barriers.append(barrier)
