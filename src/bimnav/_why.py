@@ -332,9 +332,10 @@ def _narrow(graph: NavGraph, environment: IndoorEnvironment, start: Cell, goal: 
         size = graph.frame.cell_size
         text = f"cells of {size:g} m are too large to show the way: it is {width:.2f} m wide {where}"
         return NoRoute("cells", text, (), width, 0.0, point)
-    names = " and ".join(f"{name} ({global_id})" if global_id else name for global_id, name in sides)
+    names = " and ".join(dict.fromkeys(f"{name} ({global_id})" if global_id else name for global_id, name in sides))
+    between = "between" if len(set(sides)) > 1 else "within"
     text = (
-        f"too narrow by {100 * shortage:.0f} cm: the widest way is {width:.2f} m wide {where}, between {names}; "
+        f"too narrow by {100 * shortage:.0f} cm: the widest way is {width:.2f} m wide {where}, {between} {names}; "
         f"the robot is {2 * robot.radius:.2f} m wide"
     )
     ids = tuple(dict.fromkeys(global_id for global_id, _ in sides if global_id))
