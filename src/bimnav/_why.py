@@ -356,9 +356,7 @@ def _fine_cells(graph: NavGraph, fine: NavGraph) -> list[Cell]:
 
 def _narrowest(fine: NavGraph, begin: Cell, end: Cell) -> Cell:
     """Return the cell in which the widest way between two cells has the least clearance."""
-    from scipy import ndimage
-
-    clearance = np.stack([ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] for free in fine.free])
+    clearance = search.clearances(fine.free)
     links = fine.links[0]
     start, goal = (_flat(cell, clearance) for cell in (begin, end))
     clearance.reshape(-1)[[start, goal, *links.ravel().tolist()]] = np.inf
