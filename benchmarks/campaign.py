@@ -1,6 +1,6 @@
 """Read two thousand damaged models and say what became of them.
 
-    python benchmarks/campaign.py [--families NAME ...] [--number N] [--jobs N]
+    python benchmarks/campaign.py [--families NAME ...] [--number N] [--seed TEXT] [--jobs N]
 
 prints a line for every file that was not met as it should be, and a table of families and outcomes.
 """
@@ -27,6 +27,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--families", nargs="*", default=list(SHARES), choices=list(SHARES))
     parser.add_argument("--number", type=int, help="files of each family; all of them if not given")
+    parser.add_argument("--seed", default="", help="any text gives another two thousand files")
     parser.add_argument("--jobs", type=int, default=2, help="files at a time")
     parser.add_argument("--verbose", action="store_true", help="name every file")
     args = parser.parse_args()
@@ -38,7 +39,7 @@ def main() -> None:
         tempfile.tempdir = str(temporary)
         for family in args.families:
             row = table[family] = Counter()
-            for verdict in campaign(cases(family, args.number), Path(name), args.jobs):
+            for verdict in campaign(cases(family, args.number, args.seed), Path(name), args.jobs):
                 row[verdict.outcome] += 1
                 row[WRONG] += bool(verdict.wrong)
                 if verdict.wrong or args.verbose:

@@ -86,12 +86,12 @@ def _mutation(
     return register
 
 
-def cases(family: str, number: int | None = None) -> Iterator[Case]:
-    """The files of a family, or the first few; they go through its mutations in turn."""
+def cases(family: str, number: int | None = None, seed: str = "") -> Iterator[Case]:
+    """The files of a family, or the first few; they go through its mutations in turn. Another seed gives others."""
     kinds = _KINDS[family]
     for k in range(SHARES[family] if number is None else number):
         kind = kinds[k % len(kinds)]
-        rng = random.Random(f"{family} {k}")
+        rng = random.Random(f"{family} {k}{seed}")
         base = rng.choice([base for base in BASES if base.startswith(kind.of)])
         draft = draft_of(base)
         content = kind.make(draft, rng)
