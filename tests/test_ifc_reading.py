@@ -504,14 +504,30 @@ def stalled_reader(path: Path) -> subprocess.Popen[str]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_ctrl_c_ends_the_process_and_leaves_nothing(tmp_path: Path):
+def test_ctrl_c_ends_the_process_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
     path = written(tmp_path, staller(500))
     with stalled_reader(path) as process:
+        assert len(list(temporary.iterdir())) == 1
         start = time.monotonic()
         process.send_signal(signal.SIGINT)
         _, stderr = process.communicate(timeout=20)
-        assert time.monotonic() - start < 3.0
+        assert time.monotonic() - start < 3.0  # 0.2 s on an idle machine
     assert "KeyboardInterrupt" in stderr
+    assert until(lambda: processes_about(str(path)) == [])
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_ctrl_c_on_the_command_line_is_one_line_and_an_exit_code(tmp_path: Path):
+    path = written(tmp_path, staller(500))
+    process = subprocess.Popen([sys.executable, "-m", "bimnav.cli", "inspect", str(path)], stderr=subprocess.PIPE)
+    assert until(lambda: len(processes_about(str(path))) == 2)
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=20)
+    assert (process.returncode, stderr) == (130, b"bimnav: stopped\n")
     assert until(lambda: processes_about(str(path)) == [])
 
 
