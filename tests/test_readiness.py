@@ -190,7 +190,9 @@ def test_what_is_doubtful_in_a_model_is_listed_with_advice():
         "socket", "IfcBuildingElementProxy", "Duplex Receptacle", shapes=box("x", 0, 1, 0.3, 0.02, 1.1, 0.4).shapes
     )
     lost_leaf = box("lost", 30, 0, 0, 31, 0.1, 2, ifc_class="IfcDoor")
-    values = {"Pset": {"SerialNumber": "SerialNumber", "BarCode": "n/a", "Warranty": "DD/MM/YYYY", "Color": "red"}}
+    values = {
+        "Pset": {"SerialNumber": "SerialNumber", "BarCode": "n/a", "Warranty": "DD/MM/YYYY", "Color": "red", "Phase": 0}
+    }
     house = two_rooms(elements=[chair, receptacle, lost_leaf])
     house = replace(
         house,
@@ -202,6 +204,7 @@ def test_what_is_doubtful_in_a_model_is_listed_with_advice():
     assert issues["furniture-as-proxy"].global_ids == ("chair",)
     assert issues["door-to-nowhere"].global_ids == ("lost",)
     assert issues["placeholder-data"].global_ids == ("chair",)
+    assert "SerialNumber = 'SerialNumber', BarCode = 'n/a'" in issues["placeholder-data"].message
     assert "doubtful-unit" in issues
     assert all(issue.hint for code, issue in issues.items() if code != "doubtful-unit")
 

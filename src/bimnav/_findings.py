@@ -12,6 +12,7 @@ import numpy as np
 from bimnav._gates import DoorCheck
 from bimnav._placeholders import is_placeholder
 from bimnav._reach import Reach
+from bimnav._wording import counted
 from bimnav.building import Building, Issue
 from bimnav.environment import IndoorEnvironment
 
@@ -29,6 +30,7 @@ _FURNITURE = re.compile(
 )
 _ROOMS_AT = {"inside": 2, "outside": 1, "nowhere": 0}
 _LOOKED_AT = 40  # products whose properties are read in search of placeholders
+_ZERO = "0"  # as a text; the number may be meant
 _LEAST = 3  # placeholders that make a habit
 _RECORDED = ("IfcFurn", "IfcFlow", "IfcDoor", "IfcSanitary", "IfcSystemFurniture", "IfcBuildingElementProxy")
 
@@ -42,31 +44,31 @@ def findings(
     def issue(code: str, message: str, ids: Iterable[str], hint: str, severity: Any = "warning") -> Iterable[Issue]:
         found = tuple(ids)
         if found:
-            yield Issue(code, message.replace("{n}", str(len(found))), found, severity, hint)
+            yield Issue(code, counted(message, len(found)), found, severity, hint)
 
     yield from issue(
         "room-without-door",
-        "{n} rooms have no door or passage.",
+        "{n} [room has|rooms have] no door or passage.",
         (room.global_id for room in rooms if room.reason == "no-door"),
         "Model the doors or openings that lead there; name shafts as such.",
     )
     yield from issue(
         "door-to-nowhere",
-        "{n} doors have no floor on either side.",
+        "{n} [door has|doors have] no floor on either side.",
         (door.global_id for door in doors if door.leads == "nowhere"),
         "Model the rooms or slabs that they join, at the height of the doors.",
     )
     if building.spaces:
         yield from issue(
             "door-without-room",
-            "{n} doors touch no room, or have floor on both sides and a room on one alone.",
+            "{n} [door touches|doors touch] no room, or a room on one side and floor without a room on the other.",
             (door.global_id for door in doors if len(door.spaces) < _ROOMS_AT[door.leads]),
             "Model the rooms or corridors that they open to.",
             "info",
         )
     yield from issue(
         "furniture-as-proxy",
-        "{n} proxies are called like furniture.",
+        "{n} [proxy is|proxies are] called like furniture.",
         (e.global_id for e in building.elements if e.ifc_class == "IfcBuildingElementProxy" and _is_furniture(e)),
         "Map the family to IfcFurniture, so that tasks find it by its class.",
         "info",
@@ -109,20 +111,20 @@ def _placeholders(building: Building) -> Iterable[Issue]:
         return
     sample = [e for e in building.elements if e.ifc_class.startswith(_RECORDED)]
     sample = sample[:: max(len(sample) // _LOOKED_AT, 1)][:_LOOKED_AT]
-    names = Counter[str]()
+    examples = Counter[str]()
     found = []
     for element in sample:
         empty = list(_empty(building.properties(element.global_id)))
-        names.update(empty)
+        examples.update(empty)
         found += [element.global_id] if len(empty) >= _LEAST else []
     if found:
-        common = ", ".join(name for name, _ in names.most_common(5))
-        message = f"{len(found)} of {len(sample)} products looked at hold placeholders for data, such as in {common}."
+        common = ", ".join(example for example, _ in examples.most_common(5))
+        message = f"{len(found)} of {len(sample)} products looked at hold placeholders for data, such as {common}."
         yield Issue("placeholder-data", message, tuple(found), "info", "Fill them in or leave them out of the export.")
 
 
 def _empty(sets: Mapping[str, Mapping[str, Any]]) -> Iterable[str]:
     for properties in sets.values():
         for name, value in properties.items():
-            if is_placeholder(name, value):
-                yield name
+            if is_placeholder(name, value) or value == _ZERO:
+                yield f"{name} = {value!r}"

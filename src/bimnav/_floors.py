@@ -12,6 +12,7 @@ import shapely
 from bimnav._doorways import Doorway, doorway_of
 from bimnav._indoors import Shell, opened, outline, part_in
 from bimnav._levels import NEAR, Ground, Room
+from bimnav._wording import counted
 from bimnav.building import Building, Issue, Storey
 from bimnav.footprint import unite
 from bimnav.robot import Robot
@@ -88,7 +89,9 @@ def find_floors(
     if outdoors:
         floors = survey.with_outdoors(floors)
     if guessed:
-        message = "storeys without spaces and floor slabs: their floor is guessed from their walls."
+        message = counted(
+            "{n} [storey has|storeys have] neither rooms nor slabs; the floor is guessed from walls.", len(guessed)
+        )
         ids = tuple(floor.storey.global_id for floor in guessed)
         issues.append(Issue("floor-guessed", message, ids, "warning", "Export spaces or floor slabs."))
     return tuple(_named(survey.with_doorways(floors))), tuple(issues)
@@ -132,11 +135,14 @@ class _Survey:
         floors = [floor.with_pieces(self._laid(floor.level, self._built_on(floor.level, floors))) for floor in floors]
         issues = []
         if bare:
-            message = f"{len(bare)} rooms have a door but no slab, others beside them have; they are taken as floor."
+            message = counted(
+                "{n} [room has a door but no slab|rooms have doors but no slabs], as others have; taken as floor.",
+                len(bare),
+            )
             hint = "Model their slabs, or name them as shafts or voids."
             issues.append(Issue("missing-slab", message, tuple(bare), "warning", hint))
         if voids:
-            message = f"{len(voids)} rooms are shafts or voids; they are not floor."
+            message = counted("{n} [room is a shaft or void|rooms are shafts or voids]; not floor.", len(voids))
             issues.append(Issue("shaft", message, tuple(voids), "info", "A slab at their base would make them floor."))
         return floors, issues
 

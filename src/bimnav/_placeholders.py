@@ -9,8 +9,9 @@ __all__ = ["is_placeholder"]
 
 _NOTHING = re.compile(
     r"n/?a|none|null|undefined|not ?defined|unknown|varies|default|tb[dc]|todo|x{2,}|\?+|_[A-Z -]+_|dd/mm/yyyy"
-    r"|1900-12-31(t[\d:]+)?|unbekannt|undefiniert",
-    re.IGNORECASE,
+    r"|1900-12-31(t[\d:]+)?|unbekannt|undefiniert|<default>|-+|sample( \w+)*|lorem ipsum.*|enter \w+ here.*"
+    r"|project (name|number|status|address|issue date)|building name|(nombre|estado) de proyecto|introduzca .*",
+    re.IGNORECASE | re.DOTALL,
 )
 
 

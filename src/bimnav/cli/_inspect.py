@@ -39,7 +39,7 @@ def _command(options: argparse.Namespace) -> int:
     ledger = report["ledger"]
     lines = [f"{report['name']}: {report['schema']}, length unit {report['unit']}"]
     lines += [
-        f"  {storey['name']:<24} floor at {storey['elevation']:8.3f} m  {storey['floor_area']:9.1f} m2  "
+        f"  {storey['name']:<24} floor at {storey['floor_level']:8.3f} m  {storey['floor_area']:9.1f} m2  "
         f"{storey['spaces']:3d} spaces  {storey['doors']:3d} doors"
         for storey in report["storeys"]
     ]

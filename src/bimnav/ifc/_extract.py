@@ -82,6 +82,8 @@ def extract(
     taken_out = [step_id for step_id in open_circles(file, relations.circular) if step_id in ids]
     findings.about_file(renamed, sanitize(products), taken_out, relations.malformed, log)
 
+    findings.about_description(sorted_of(file, "IfcProject", "IfcSite", "IfcBuilding"))
+
     asked = [product for product in products if product.Representation]
     no_part = left_out_by_class(file)
     solids, contexts, left_out, lost = _sort_out(asked, no_part)

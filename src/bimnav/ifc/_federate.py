@@ -182,13 +182,13 @@ def _join(first: Building, other: Building, aliases: dict[str, str]) -> Building
     _compare_places(first, other, findings)
     findings.add(
         "same-space",
-        f"{{n}} spaces of {name} are known under other GlobalIds; they were left out.",
+        f"{{n}} [space|spaces] of {name} known under other GlobalIds [was|were] left out.",
         twins,
         severity="info",
     )
     findings.add(
         "global-id-clash",
-        f"{{n}} products of {name} have the GlobalIds of products of another kind; they were left out.",
+        f"{{n}} [product|products] of {name} with the GlobalIds of products of another kind [was|were] left out.",
         clashing,
         severity="error",
         hint="Give them GlobalIds of their own.",
@@ -311,14 +311,14 @@ def _storeys(
         storey_of[storey.global_id] = known.setdefault(same.global_id, same).global_id
     findings.add(
         "storey-heights",
-        f"{{n}} storeys have other heights in {name}; those of {_name_of(first)} hold.",
+        f"{{n}} [storey has another height|storeys have other heights] in {name}; those of {_name_of(first)} hold.",
         [s.global_id for s in other.storeys if abs(known[storey_of[s.global_id]].elevation - s.elevation) > SAME],
         severity="warning" if is_placed else "info",
         hint="Check the length unit and the storeys of both.",
     )
     findings.add(
         "separate-storey",
-        f"{{n}} storeys of {name} are none of the others, by GlobalId or by name and height; they are listed apart.",
+        f"{{n}} [storey|storeys] of {name} [is|are] none of the others, by GlobalId or by name and height.",
         [global_id for global_id in known if global_id not in {storey.global_id for storey in first.storeys}],
         severity="info",
         hint="If they are the same, export both files from the same levels, or state offsets=.",
@@ -331,7 +331,7 @@ def _compare_places(first: Building, other: Building, findings: Findings) -> Non
     name, there, here = _name_of(other), boxes_of(first), boxes_of(other)
     findings.add(
         "moved-product",
-        f"{{n}} products lie elsewhere in {name}; the shapes of {_name_of(first)} hold.",
+        f"{{n}} [product lies|products lie] elsewhere in {name}; the shapes of {_name_of(first)} hold.",
         [g for g, box in here.items() if g in there and _gap(box, there[g]) > SAME],
         hint="The files may be of different dates, or need offsets=.",
     )

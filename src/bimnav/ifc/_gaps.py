@@ -137,7 +137,7 @@ def note_lost(model: Model, file: Any, broken: Mapping[int, str], shaped: Mappin
     findings = Findings(ids)
     findings.add(
         "damaged-text",
-        "{n} products refer to what is not in the file or has no place in its schema.",
+        "{n} [product refers|products refer] to what is not in the file or has no place in its schema.",
         reasons,
         severity="error",
         hint="The file is damaged or its exporter at fault; export it again.",
