@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         doors_of as doors_of,
     )
     from bimnav.robot import Robot as Robot
+    from bimnav.robots import list_robots as list_robots, load_robot as load_robot
     from bimnav.samples import list_samples as list_samples, sample as sample
     from bimnav.sim import SimResult as SimResult, simulate as simulate
     from bimnav.stops import Stand as Stand, Stop as Stop, Unreached as Unreached
@@ -120,6 +121,7 @@ _HOMES = {
     "bimnav.plot": "plot_environment plot_graph plot_tour",
     "bimnav.readiness": "DoorCheck Readiness RoomCheck StoreyCheck doors_of",
     "bimnav.robot": "Robot",
+    "bimnav.robots": "list_robots load_robot",
     "bimnav.samples": "list_samples sample",
     "bimnav.sim": "SimResult simulate",
     "bimnav.tasks": "Overruled Rule Standoff Task list_tasks load_task",

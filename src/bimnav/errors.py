@@ -187,6 +187,12 @@ class SelectorError(TaskError):
     code = "BN-TSK-002"
 
 
+class RobotError(InputError):
+    """A robot file or the name of a robot is wrong."""
+
+    code = "BN-ROB-001"
+
+
 class ReaderError(BimnavError, RuntimeError):
     """The process that reads the model failed; the calling program is unharmed."""
 

@@ -1,4 +1,4 @@
-"""The command line: `bimnav run`, `inspect`, `tasks`, `cache` and `doctor`."""
+"""The command line: `bimnav run`, `inspect`, `tasks`, `robots`, `cache` and `doctor`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 import bimnav as bn
-from bimnav.cli import _cache, _doctor, _inspect, _run, _tasks
+from bimnav.cli import _cache, _doctor, _inspect, _robots, _run, _tasks
 from bimnav.cli._shared import BAD_INPUT, BUG, DONE, INTERRUPTED
 from bimnav.errors import BimnavError, UnsafePlanError
 
@@ -66,6 +66,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="bimnav", description="From IFC building models to robot tasks, routes and simulation.")
     parser.add_argument("--version", action="version", version=f"bimnav {bn.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for room in (_run, _inspect, _tasks, _cache, _doctor):
+    for room in (_run, _inspect, _tasks, _robots, _cache, _doctor):
         room.add_to(commands)
     return parser

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import bimnav as bn
@@ -36,10 +37,15 @@ def add_to(commands: Commands) -> None:
     run.add_argument("--cell", type=length, default=0.3048, metavar="SIZE", help="edge of a cell (default: 1ft)")
     run.add_argument("--connectivity", type=int, choices=(4, 8), default=4, help="neighbors of a cell (default: 4)")
     run.add_argument("--start", type=place, metavar="X,Y[,STOREY]", help="default: the charging dock, if there is one")
-    run.add_argument("--robot", default="R1", metavar="NAME", help="name in the report and the log (default: R1)")
-    run.add_argument("--radius", type=length, default=0.0, help="of the robot (default: 0, the paper's point)")
-    run.add_argument("--height", type=length, default=1.0, help="of the robot (default: 1)")
-    run.add_argument("--speed", type=length, default=0.5, help="metres per second (default: 0.5)")
+    run.add_argument(
+        "--robot",
+        default="R1",
+        metavar="NAME|FILE#NAME",
+        help="a profile: see `bimnav robots`; any other name is that of the paper's point robot (default: R1)",
+    )
+    run.add_argument("--radius", type=length, help="of the robot (default: the profile's; 0, the paper's point)")
+    run.add_argument("--height", type=length, help="of the robot (default: the profile's; 1)")
+    run.add_argument("--speed", type=length, help="metres per second (default: the profile's; 0.5)")
     run.add_argument("--target", type=target, action="append", default=[], metavar="NAME@X,Y[,STOREY]")
     run.add_argument("--targets", action="append", default=[], metavar="FILE", help="CSV or JSON of detected objects")
     run.add_argument("--refine", choices=("auto",), help="halve the cells until no target lies on an obstacle cell")
@@ -73,7 +79,7 @@ def _command(options: argparse.Namespace) -> int:
         task=options.task,
         cell_size=options.cell,
         connectivity=options.connectivity,
-        robot=bn.Robot(options.robot, options.radius, options.height, options.speed),
+        robot=_robot(options),
         start=options.start,
         targets=placed,
         refine=options.refine,
@@ -88,8 +94,19 @@ def _command(options: argparse.Namespace) -> int:
     if options.json:
         show_json(report)
     else:
-        show(_summary(report, is_point=options.radius == 0))
+        show(_summary(report, is_point=mission.environment.robot.radius == 0))
     return DONE if mission.is_complete else INCOMPLETE
+
+
+def _robot(options: argparse.Namespace) -> bn.Robot:
+    """Return the profile that is named, with what else was said of the robot."""
+    from bimnav.robots import robot_named
+
+    said = {name: getattr(options, name) for name in ("radius", "height", "speed")}
+    said = {name: value for name, value in said.items() if value is not None}
+    if "radius" in said:
+        said["outline"] = None  # a radius makes a round body
+    return replace(robot_named(options.robot), **said)
 
 
 def _summary(report: dict[str, Any], *, is_point: bool) -> str:

@@ -1,0 +1,55 @@
+"""`bimnav robots`: the robots there are."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from bimnav.cli._shared import DONE, show, show_json
+
+if TYPE_CHECKING:
+    from bimnav.cli._shared import Commands
+    from bimnav.robot import Robot
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command to the parser."""
+    robots = commands.add_parser("robots", help="list the robots there are, or show one")
+    robots.add_argument("action", nargs="?", choices=("list", "show"), default="list")
+    robots.add_argument("robot", nargs="?", metavar="NAME|FILE#NAME", help="with show: which one")
+    robots.add_argument("--json", action="store_true")
+    robots.set_defaults(command=_command)
+
+
+def _command(options: argparse.Namespace) -> int:
+    from bimnav.errors import RobotError
+    from bimnav.robots import list_robots, load_robot
+
+    if options.action == "show":
+        if options.robot is None:
+            raise RobotError("no robot is named.", "Name one, as in bimnav robots show inspection.")
+        values = _plain(load_robot(options.robot))
+        if options.json:
+            show_json(values)
+        else:
+            show("\n".join(f"{name:<16} {_told(value)}" for name, value in values.items()))
+        return DONE
+    known = list_robots()
+    if options.json:
+        show_json([each._asdict() for each in known])
+    else:
+        show("\n".join(f"{robot.name:<16} {robot.description}" for robot in known))
+    return DONE
+
+
+def _plain(robot: Robot) -> dict[str, Any]:
+    """Return the fields of a robot; None where there is no limit."""
+    return {name: None if value == math.inf else value for name, value in asdict(robot).items()}
+
+
+def _told(value: Any) -> str:
+    if value is None or value == ():
+        return "-"
+    return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
