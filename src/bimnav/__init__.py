@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from bimnav._door_access import DoorAccess as DoorAccess
     from bimnav._explain import CellExplanation as CellExplanation, Explanation as Explanation, Reason as Reason
     from bimnav._georeference import Georeference as Georeference
+    from bimnav._oriented import PosePath as PosePath, find_poses as find_poses
     from bimnav._start import Start as Start, find_start as find_start
     from bimnav._why import NoRoute as NoRoute, why_unreachable as why_unreachable
     from bimnav.assets import Asset as Asset
@@ -89,7 +90,12 @@ if TYPE_CHECKING:
         list_tasks as list_tasks,
         load_task as load_task,
     )
-    from bimnav.verify import Check as Check, check_path as check_path, check_plan as check_plan
+    from bimnav.verify import (
+        Check as Check,
+        check_path as check_path,
+        check_plan as check_plan,
+        check_poses as check_poses,
+    )
 
 __version__ = "0.1.0"
 
@@ -110,6 +116,7 @@ _HOMES = {
     "bimnav._explain": "CellExplanation Explanation Reason",
     "bimnav._georeference": "Georeference",
     "bimnav._why": "NoRoute why_unreachable",
+    "bimnav._oriented": "PosePath find_poses",
     "bimnav._start": "Start find_start",
     "bimnav.ifc._federate": "federate",
     "bimnav.links": "Link RefusedConnector",
@@ -125,7 +132,7 @@ _HOMES = {
     "bimnav.samples": "list_samples sample",
     "bimnav.sim": "SimResult simulate",
     "bimnav.tasks": "Overruled Rule Standoff Task list_tasks load_task",
-    "bimnav.verify": "Check check_path check_plan",
+    "bimnav.verify": "Check check_path check_plan check_poses",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
 

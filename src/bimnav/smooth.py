@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bimnav.environment import IndoorEnvironment
     from bimnav.graph import NavGraph
 
-__all__ = ["Straight", "straighten", "turns_of"]
+__all__ = ["Straight", "closed_cells", "straighten", "turns_of"]
 
 Point = tuple[float, float, float]
 
@@ -94,6 +94,11 @@ def _without_repeats(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _length(points: NDArray[np.float64]) -> float:
     return math.fsum(np.hypot(*np.diff(points, axis=0).T))
+
+
+def closed_cells(graph: NavGraph, storey: int) -> NDArray[np.bool_]:
+    """Return the cells of a storey that were closed after the graph was built, and blocked ones beside them."""
+    return _Plane.of(graph, storey).closed_cells()
 
 
 _planes: WeakKeyDictionary[NavGraph, dict[int, _Plane]] = WeakKeyDictionary()
@@ -216,7 +221,7 @@ class _Plane:
         footprints = [obstacle.footprint for obstacle in environment.obstacles_on(self.storey)]
         bodies = list(shapely.buffer(footprints, grown, quad_segs=_QUARTER)) if footprints else []
         bodies += list(shapely.buffer(self._restricted, _MARGIN)) if self._restricted else []
-        closed = np.argwhere(self._closed_cells()).tolist()
+        closed = np.argwhere(self.closed_cells()).tolist()
         cells = [shapely.box(*self.frame.box_of(Cell(self.storey, row, col))) for row, col in closed]
         bodies += list(shapely.buffer(cells, _MARGIN, join_style="mitre")) if cells else []
         floor = shapely.buffer(environment.floor(self.storey), -_MARGIN, join_style="mitre")
@@ -227,7 +232,7 @@ class _Plane:
         zones = self.environment.zones if self.environment else ()
         return [zone.polygon for zone in zones if zone.storey == self.storey and zone.factor == math.inf]
 
-    def _closed_cells(self) -> NDArray[np.bool_]:
+    def closed_cells(self) -> NDArray[np.bool_]:
         """Return the cells that were closed after the graph was built, and the blocked ones beside them.
 
         A cell may be blocked by what covers a part of it. Where its neighbor was closed, what is left of it

@@ -17,6 +17,7 @@ import fcl
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
+from shapely.affinity import affine_transform
 
 from bimnav.errors import GeometryError, UnsafePlanError
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from bimnav.links import Link
     from bimnav.plan import Tour
 
-__all__ = ["Check", "Violation", "check_path", "check_plan"]
+__all__ = ["Check", "Violation", "check_path", "check_plan", "check_poses"]
 
 Kind = Literal[
     "empty",
@@ -58,6 +59,7 @@ _SKIN = 1e-4  # metres; the body in space is thinner by this: the meshes of roun
 _CLOSE = 0.03  # metres of height; a floor finish that a connector does not know of
 _NEAR = 1.0  # metres; how far around the body the clearance in space is measured
 _HALF_TURN = 16  # chords of half a round body; they lie inside the circle, so a touch is a true touch
+_TURN_STEP = math.radians(0.25)
 _FARTHEST = 1e8  # metres from the origin; beyond it float64 no longer resolves a slack
 _SLICE = 0.05  # metres of height in which the body on a stair is judged
 _CONTACTS = 100  # of one element; more would only name the same trouble again
@@ -184,6 +186,124 @@ def check_path(
         If `points` has another shape. Points that are not finite are a violation.
     """
     return _judge([(None, _polyline(points))], _surroundings(environment, ignore), body, [])
+
+
+def check_poses(poses: ArrayLike, environment: IndoorEnvironment, *, ignore: Collection[str] = ()) -> Check:
+    """Judge a motion of a robot that is not round, in plan view: all that its outline sweeps.
+
+    From pose to pose the outline either moves straight without turning or turns on the spot the short way.
+    Straight moves are judged exactly; turns at every quarter of a degree, which misses less than a hundred
+    thousandth of the outline's reach. The body in space is not judged.
+
+    Parameters
+    ----------
+    poses : (n, 4) float64
+        x, y and z in world metres, z a level of the environment, and the heading in radians
+        counter-clockwise from x.
+    environment
+        Regions, obstacles, zones, and the robot, whose outline is taken; without one, a disc.
+    ignore
+        GlobalIds of obstacles that may be touched.
+
+    Raises
+    ------
+    GeometryError
+        If `poses` has another shape.
+    """
+    motion = np.asarray(poses, dtype=np.float64)
+    if motion.ndim != 2 or motion.shape[1] != 4:
+        raise GeometryError(f"a motion has shape {motion.shape}.", "Give an array of shape (n, 4): x, y, z, heading.")
+    world = _surroundings(environment, ignore)
+    found = list(world.unknown)
+    if not len(motion):
+        return Check((*found, _refusal("empty", "the motion has no pose")))
+    if not np.isfinite(motion).all():
+        return Check((*found, _refusal("not-finite", "the motion has poses that are not finite")))
+    on = np.flatnonzero(np.abs(world.levels - motion[0, 2]) <= _SAME)
+    if not len(on) or np.ptp(motion[:, 2]) > _SAME:
+        return Check((*found, _refusal("no-storey", "the motion is not on one storey", motion[0, :3])))
+    storey = int(on[0])
+    length, clearance = 0.0, math.inf
+    outline = shapely.Polygon(environment.robot.outline or _ring(world.radius))
+    mine = world.storeys == storey
+    owners = [owner for owner, is_mine in zip(world.owners, mine, strict=True) if is_mine]
+    floors = shapely.union_all([floor for where, floor in world.floors if where == storey])
+    floor = shapely.buffer(floors, _GAP, join_style="mitre")
+    zones = [(zone, owner) for where, zone, owner in world.restricted if where == storey]
+    worst: dict[tuple[str, str], Violation] = {}
+    for before, after in zip(motion, motion[[*range(1, len(motion)), -1]], strict=True):
+        swept = _swept_by_outline(outline, before, after)
+        if swept is None:
+            found.append(_refusal("teleport", "the robot moves and turns at once", before[:3], storey=storey))
+            continue
+        line = shapely.LineString([before[:2], after[:2]]) if (before[:2] != after[:2]).any() else None
+        middle = shapely.Point(before[:2]) if line is None else line
+        length += middle.length
+        for shape, owner in zip(world.footprints[mine], owners, strict=True):
+            gap = float(shapely.distance(swept, shape))
+            clearance = min(clearance, gap)
+            if gap > 0:
+                continue
+            depth = _overlap(swept, shape)
+            clearance = min(clearance, -depth)
+            if depth > _SLACK:
+                said = _refusal("footprint", f"the robot reaches into {_who(owner)}", before[:3], depth, owner, storey)
+                key = "footprint", owner[0]
+                if key not in worst or worst[key].depth < depth:
+                    worst[key] = said
+        for zone, owner in zones:
+            if shapely.relate_pattern(middle, zone, "T********"):
+                worst.setdefault(
+                    ("restricted", owner[0]),
+                    _refusal("restricted", f"the robot enters {_who(owner)}", before[:3], 0.0, owner, storey),
+                )
+        off = shapely.difference(swept, floor)
+        if off.area > _SAME:
+            left = _refusal("off-floor", "the robot leaves the floor", before[:3], 0.0, storey=storey)
+            worst.setdefault(("off-floor", ""), left)
+    found += sorted(worst.values(), key=lambda v: -v.depth)
+    return Check(tuple(found), clearance, None, length)
+
+
+def _ring(radius: float) -> list[tuple[float, float]]:
+    angle = np.linspace(0, 2 * math.pi, 4 * _HALF_TURN, endpoint=False)
+    reach = max(radius, _SAME)
+    return list(zip((reach * np.cos(angle)).tolist(), (reach * np.sin(angle)).tolist(), strict=True))
+
+
+def _at_pose(outline: BaseGeometry, x: float, y: float, angle: float) -> BaseGeometry:
+    c, s = math.cos(angle), math.sin(angle)
+    return affine_transform(outline, [c, -s, s, c, x, y])
+
+
+def _swept_by_outline(
+    outline: BaseGeometry, before: NDArray[np.float64], after: NDArray[np.float64]
+) -> BaseGeometry | None:
+    """Return what an outline sweeps from pose to pose; None if it moves and turns at once."""
+    turn = math.remainder(float(after[3] - before[3]), 2 * math.pi)
+    moves = math.hypot(*(after[:2] - before[:2])) > _SLACK
+    if moves and abs(turn) > _SAME:
+        return None
+    begin = _at_pose(outline, before[0], before[1], before[3])
+    if not moves:
+        count = max(1, math.ceil(abs(turn) / _TURN_STEP))
+        angles = before[3] + turn * np.arange(count + 1) / count
+        return shapely.union_all([_at_pose(outline, before[0], before[1], float(angle)) for angle in angles])
+    # what an edge sweeps is a parallelogram
+    ring = shapely.get_coordinates(begin)
+    by = after[:2] - before[:2]
+    corners = np.stack([ring[:-1], ring[1:], ring[1:] + by, ring[:-1] + by], axis=1)
+    sheets = shapely.convex_hull(shapely.multipoints(corners))
+    return shapely.union_all([begin, *sheets, _at_pose(outline, after[0], after[1], before[3])])
+
+
+def _overlap(swept: BaseGeometry, shape: BaseGeometry) -> float:
+    """Return how wide the common part of a shape and of what is swept is, metres; 0 if they only touch."""
+    common = [part for part in shapely.get_parts(shapely.intersection(swept, shape)) if part.area > 0]
+    widths = [2 * shapely.maximum_inscribed_circle(part).length for part in common]
+    if not widths and shapely.relate_pattern(swept, shape, "T********"):
+        return _SAME  # a footprint without area
+    return float(max(widths, default=0.0))
 
 
 def check_plan(tour: Tour) -> Check:

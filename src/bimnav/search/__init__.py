@@ -6,6 +6,7 @@ from bimnav.search.exact import share_out, trace_visits, visit_table
 from bimnav.search.layout import Layout
 from bimnav.search.mesh import Mesh, mesh_of_mask, mesh_of_triangles
 from bimnav.search.ordering import Ordering, is_small, order_few, order_groups, order_rows
+from bimnav.search.oriented import HEADINGS, find_motion
 from bimnav.search.repair import Field
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import Taut, find_taut
@@ -13,6 +14,7 @@ from bimnav.search.transform import clearances
 from bimnav.search.warmup import warmup
 
 __all__ = [
+    "HEADINGS",
     "Field",
     "Found",
     "Layout",
@@ -26,6 +28,7 @@ __all__ = [
     "distances",
     "distances_between",
     "find",
+    "find_motion",
     "find_taut",
     "is_small",
     "mesh_of_mask",

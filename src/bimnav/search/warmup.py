@@ -9,6 +9,7 @@ from bimnav.search.engine import distances, distances_between, find
 from bimnav.search.layout import Layout
 from bimnav.search.mesh import mesh_of_mask
 from bimnav.search.ordering import EXACT, order_rows
+from bimnav.search.oriented import find_motion
 from bimnav.search.repair import Field
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import find_taut
@@ -23,6 +24,8 @@ def warmup() -> None:
     cells = np.array([0, 8])
     components(cost > 0)
     clearances(cost > 0)
+    everywhere = np.ones((8, 3, 3), dtype=np.bool_)
+    find_motion(everywhere, everywhere, (0, 0, 0), (-1, 2, 2), 1.0, 2.0)
     mesh, face = mesh_of_mask(np.eye(3) < 1)
     find_taut(mesh, (0.5, 2.5), int(face[2, 0]), (2.5, 0.5), int(face[0, 2]))
     line = np.array([[0.5, 0.5], [2.5, 0.5], [2.5, 2.5]])
