@@ -299,3 +299,23 @@ def test_sockets_and_switches_of_the_duplex_are_served_from_their_rooms():
         sides = [np.sign(y - party[:, 1].mean()) for y in (stop.end[1], stop.destination[1])]
         near = abs(stop.destination[1] - party[:, 1].mean()) < 0.25
         assert near or sides[0] == sides[1], stop.name
+
+
+def test_zones_lie_under_things_that_hang_and_under_sheets_on_the_floor():
+    things = {
+        "wet floor": box("wet floor", 1, 0, 0.0, 2, 4, 0.001, name="Wet floor"),
+        "projector": box("projector", 3, 0, 2.0, 4, 4, 2.2, name="Projector"),
+        "rack": box("rack", 4.2, 0, 0.4, 4.9, 1, 2.0, name="Rack"),
+    }
+    task = Task("go", avoid=[Rule(words=["wet floor", "projector"], factor=5.0)], restricted=[Rule(words=["rack"])])
+    environment = bn.make_environment(room(elements=things.values()), task, bn.Robot(height=0.3))
+    assert {zone.global_id: (zone.storey, zone.factor) for zone in environment.zones} == {
+        "wet floor": (0, 5.0),
+        "projector": (0, 5.0),
+        "rack": (0, math.inf),
+    }
+    graph = bn.build_graph(environment, cell_size=0.1)
+    costs = [
+        float(graph.cost[graph.frame.cell_at(x, y, storey=0)]) for x, y in ((1.5, 2), (3.5, 2), (0.5, 2), (4.5, 0.5))
+    ]
+    assert costs == [5.0, 5.0, 1.0, math.inf]

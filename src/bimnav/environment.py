@@ -472,9 +472,12 @@ def _zones(product: Element | Space, levels: Sequence[float], factor: float, why
     if bounds is None:
         return
     polygon = outline(product.shapes)
-    for storey, level in enumerate(levels):
-        if bounds[0, 2] - NEAR <= level < bounds[1, 2]:
-            yield Zone(product.global_id, product.name, storey, polygon, factor, why)
+    low, high = bounds[:, 2].tolist()
+    storeys = [storey for storey, level in enumerate(levels) if low - NEAR <= level < high]
+    if not storeys and isinstance(product, Element):  # a thing that hangs, or lies flat on the floor
+        storeys = [storey for storey, level in enumerate(levels) if level <= low + NEAR][-1:]
+    for storey in storeys:
+        yield Zone(product.global_id, product.name, storey, polygon, factor, why)
 
 
 def _found(choice: Choice, environment: IndoorEnvironment) -> Target | None:
