@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         StoreyCheck as StoreyCheck,
         doors_of as doors_of,
     )
+    from bimnav.replan import Replan as Replan, Replanner as Replanner
     from bimnav.robot import Robot as Robot
     from bimnav.robots import list_robots as list_robots, load_robot as load_robot
     from bimnav.samples import list_samples as list_samples, sample as sample
@@ -90,6 +91,7 @@ if TYPE_CHECKING:
         list_tasks as list_tasks,
         load_task as load_task,
     )
+    from bimnav.topology import Topology as Topology, topology as topology
     from bimnav.verify import (
         Check as Check,
         check_path as check_path,
@@ -127,11 +129,13 @@ _HOMES = {
     ),
     "bimnav.plot": "plot_environment plot_graph plot_tour",
     "bimnav.readiness": "DoorCheck Readiness RoomCheck StoreyCheck doors_of",
+    "bimnav.replan": "Replan Replanner",
     "bimnav.robot": "Robot",
     "bimnav.robots": "list_robots load_robot",
     "bimnav.samples": "list_samples sample",
     "bimnav.sim": "SimResult simulate",
     "bimnav.tasks": "Overruled Rule Standoff Task list_tasks load_task",
+    "bimnav.topology": "Topology topology",
     "bimnav.verify": "Check check_path check_plan check_poses",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
