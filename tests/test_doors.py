@@ -73,6 +73,31 @@ def test_a_sill_is_measured_from_the_lower_floor():
     assert house.doors[0].sill == pytest.approx(0.42)
 
 
+def test_a_door_leads_outside_if_no_room_lies_behind_it():
+    house = two_rooms()
+    unmeasured = replace(house.doors[0], clear_width=None)
+    west, east = house.spaces
+    assert not house.doors[0].to_outside
+    assert replace(house, spaces=(west,), doors=(unmeasured,)).doors[0].to_outside
+    assert not replace(house, spaces=(), doors=(unmeasured,)).doors[0].to_outside  # nobody knows
+    up = replace(east, shapes=(prism_shape(shapely.box(4.2, 0, 8.2, 4), 0.6, 2.5),))  # a few steps up
+    assert not replace(house, spaces=(west, up), doors=(unmeasured,)).doors[0].to_outside
+    beyond = replace(east, shapes=(prism_shape(shapely.box(6.0, 0, 8.2, 4), 0.0, 2.5),))  # behind a stairwell
+    assert not replace(house, spaces=(west, beyond), doors=(unmeasured,)).doors[0].to_outside
+
+
+def test_a_door_to_a_balcony_does_not_lead_outside():
+    house = two_rooms()
+    (door,), (west, _) = house.doors, house.spaces
+    upper = bn.building.Space("up", "up", shapes=(prism_shape(shapely.box(0, 0, 4, 4), 3.0, 5.5),))
+    gap = prism_shape(shapely.box(4, 1.55, 4.2, 2.45), 3.0, 5.1)
+    opening = bn.building.Opening("opening-up", "wall-between", ("door-up",), (gap,))
+    leaf = box("door-up", 4.08, 1.55, 3.0, 4.12, 2.45, 5.1, ifc_class="IfcDoor")
+    doors = (replace(door, clear_width=None), bn.building.Door(leaf, opening, 0.9, 2.1))
+    house = replace(house, spaces=(west, upper), doors=doors, elements=(*house.elements, leaf))
+    assert [door.to_outside for door in house.doors] == [True, False]
+
+
 def test_without_rooms_a_sill_is_measured_from_the_slab_or_the_storey():
     house = replace(with_sill(0.12), spaces=())
     door = replace(house.doors[0], clear_width=None)

@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 import bimnav as bn
-from bimnav.building import Building, Element, Space, Storey
-from bimnav.tasks import match
+from bimnav.building import Building, Classification, Element, Facts, Space, Storey
+from bimnav.tasks import Rule, match
+from bimnav.testing import two_rooms
 from tests.conftest import REPOSITORY, real_model
 
 LABELS = Path(__file__).with_name("labels.csv")
@@ -293,6 +294,56 @@ def test_the_task_files_shown_in_the_documentation_can_be_loaded(page, tmp_path)
         assert task.targets or task.restricted
         for rule in (*task.targets, *task.restricted):
             match(replace(rule, expect="", spaces=()), one("IfcDoor", "Door", ""))
+
+
+@pytest.mark.parametrize(
+    ("properties", "is_found"),
+    [
+        ({}, True),  # geometry tells
+        ({"IsExternal": True}, True),
+        ({"IsExternal": False}, False),  # the model goes before geometry
+        ({"IsExternal": False, "FireExit": True}, True),
+        ({"IsExternal": None}, True),
+    ],
+)
+def test_what_a_model_says_of_a_door_goes_before_what_geometry_tells(properties, is_found):
+    house = two_rooms()
+    doors = (replace(house.doors[0], clear_width=None),)
+    house = replace(house, spaces=house.spaces[:1], doors=doors)
+    house = replace(house, property_reader=lambda _: {"Pset_DoorCommon": properties})
+    assert bool(match(Rule("IfcDoor", leads_outside=True), house)) == is_found
+
+
+def test_a_door_between_two_rooms_leads_nowhere_else():
+    house = replace(two_rooms(), property_reader=lambda _: {"Pset_DoorCommon": {"IsExternal": True}})
+    assert not match(Rule("IfcDoor", leads_outside=True), house)
+
+
+@pytest.mark.parametrize(
+    ("word", "name", "is_found"),
+    [
+        ("*ventil", "Absperrventil DN20", True),
+        ("*ventil", "Ventil", True),
+        ("*ventil", "Ventilator", False),
+        ("ventil*", "Ventilator", True),
+        ("ventil*", "Absperrventil", False),
+        ("*ventil*", "Absperrventile", True),
+        ("клапан*", "Клапаны", True),
+    ],
+)
+def test_a_star_stands_for_the_rest_of_a_word(word, name, is_found):
+    assert bool(match(Rule(words=[word]), one("IfcFlowController", name, ""))) == is_found
+
+
+def test_a_rule_may_leave_out_what_is_classified_as_something():
+    house = replace(
+        one("IfcSpace", "Room", ""),
+        facts_reader=lambda _: Facts(classifications=(Classification("OmniClass", "13-21 11", "Parking Spaces"),)),
+    )
+    assert match(Rule("IfcSpace"), house)
+    for word in ("parking", "OmniClass: 13.21"):
+        assert not match(Rule("IfcSpace", exclude_classification=[word]), house)
+    assert match(Rule("IfcSpace", exclude_classification=["roof"]), house)
 
 
 def test_every_task_has_a_page_that_shows_its_file():

@@ -171,3 +171,14 @@ def test_targets_placed_in_a_real_house(name, targets, served):
         if len(leg) > 1:
             line = shapely.LineString(np.asarray(leg)[:, :2])
             assert min(line.distance(o.footprint) for o in footprints) > 0
+
+
+def test_a_job_does_not_begin_in_a_pocket_between_things():
+    # a ring of furniture around the middle of the room: the robot fits inside it, and nowhere out
+    ring = [(1.5, 1.0, 3.5, 1.2), (1.5, 2.8, 3.5, 3.0), (1.5, 1.2, 1.7, 2.8), (3.3, 1.2, 3.5, 2.8)]
+    things = [box(f"thing{k}", x0, y0, 0, x1, y1, 0.5) for k, (x0, y0, x1, y1) in enumerate(ring)]
+    environment = bn.make_environment(room(elements=things), bn.Task("look"), bn.Robot(radius=0.2))
+    graph = bn.build_graph(environment, cell_size=0.1)
+    start = bn.find_start(graph)
+    assert not (1.5 < start.point[0] < 3.5 and 1.0 < start.point[1] < 3.0)
+    assert start.source == "near the middle of space"

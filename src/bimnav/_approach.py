@@ -385,6 +385,10 @@ class _Search:
             near = off.min() if len(off) else self._nearest_anywhere()
             if math.isinf(near):
                 return Miss("no free cell of its storey can be reached", math.inf)
+            if near <= robot.reach:
+                return Miss(
+                    "no way from the start: every free cell in reach of it lies in another part of the building"
+                )
             blocking = self._around()
             what = f"the nearest free cell is {near:.2f} m from it, the robot reaches {robot.reach:g} m"
             return Miss(what + self._named(blocking), float(near - robot.reach), blocking)

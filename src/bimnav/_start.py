@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from bimnav.building import Element, Space
-from bimnav.environment import IndoorEnvironment, Place
+from bimnav.environment import IndoorEnvironment, Place, Region
 from bimnav.errors import NothingWalkableError, OutsideMapError, StartBlockedError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
@@ -36,7 +36,8 @@ def find_start(graph: NavGraph, place: Place | None = None) -> Start:
         Made from an environment.
     place
         `(x, y)` or `(x, y, storey)` in metres; None for the charging dock, else the middle of the
-        largest region of the lowest walkable storey.
+        largest region of the lowest walkable storey, or the nearest point to it in the largest part of that
+        storey that the robot can move in: not between a sofa and a table.
 
     Raises
     ------
@@ -65,11 +66,22 @@ def find_start(graph: NavGraph, place: Place | None = None) -> Start:
     storeys = (graph.frame.ground, *range(graph.frame.shape[0]))
     storey = next(s for s in storeys if graph.free[s].any())
     regions = [r for r in environment.regions if r.storey == storey]
-    largest = max(regions, key=lambda region: region.polygon.area)
-    middle = largest.polygon.centroid
-    found = _nearest_free(graph, storey, middle.x, middle.y)
-    assert found is not None  # noqa: S101 - the storey was chosen because it has free cells
-    return Start(*found, f"near the middle of {largest.name}")
+    parts = graph.components[storey]
+    roomiest = int(np.bincount(parts[parts > 0]).argmax())
+    regions.sort(key=lambda region: -region.polygon.area)
+    inside = (start for region in regions if (start := _middle_of(graph, region, roomiest)) is not None)
+    rows, cols = np.nonzero(parts == roomiest)
+    anywhere = Cell(storey, int(rows[0]), int(cols[0]))
+    return next(inside, Start(anywhere, graph.frame.center_of(anywhere), f"on {environment.storeys[storey].name}"))
+
+
+def _middle_of(graph: NavGraph, region: Region, part: int) -> Start | None:
+    """Return the place in a part of the map nearest to the middle of a region; None if it lies outside the region."""
+    middle = region.polygon.centroid
+    found = _nearest_free(graph, region.storey, middle.x, middle.y, part)
+    if found is None or not region.polygon.intersects(shapely.Point(found[1][:2])):
+        return None
+    return Start(*found, f"near the middle of {region.name}")
 
 
 def _environment_of(graph: NavGraph) -> IndoorEnvironment:
@@ -85,15 +97,18 @@ def _docks(environment: IndoorEnvironment) -> Iterable[tuple[Element | Space, st
         yield from match(rule, environment.building)
 
 
-def _nearest_free(graph: NavGraph, storey: int, x: float, y: float) -> tuple[Cell, tuple[float, float, float]] | None:
-    """Return the free cell nearest to a point, and the point itself if the robot can stand on it."""
+def _nearest_free(
+    graph: NavGraph, storey: int, x: float, y: float, part: int | None = None
+) -> tuple[Cell, tuple[float, float, float]] | None:
+    """Return the free cell of a part nearest to a point, and the point itself if the robot can stand on it."""
     frame = graph.frame
+    free = graph.free[storey] if part is None else graph.components[storey] == part
     x0, y0, x1, y1 = frame.bounds
     if x0 <= x < x1 and y0 <= y < y1:
         own = frame.cell_at(x, y, storey=storey)
-        if graph.free[own] and _environment_of(graph).is_clear(storey, (x, y)):
+        if free[own[1:]] and _environment_of(graph).is_clear(storey, (x, y)):
             return own, (x, y, frame.elevations[storey])
-    rows, cols = np.nonzero(graph.free[storey])
+    rows, cols = np.nonzero(free)
     if not len(rows):
         return None
     centers = frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
