@@ -47,6 +47,7 @@ figures: .venv/made
 
 samples: .venv/made
 	$(BIN)/python data/ifc/make_samples.py
+	$(BIN)/python data/ifc/make_office.py
 
 clean:
 	rm -rf .venv out dist docs/_build .mypy_cache .ruff_cache .pytest_cache .hypothesis

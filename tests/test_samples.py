@@ -137,13 +137,13 @@ def center(shape):
 
 
 def test_a_sample_is_a_path_by_name():
-    assert list_samples() == APARTMENTS
+    assert list_samples() == (*APARTMENTS, "office")
     assert sample("apartment").name == "apartment.ifc"
     assert all(sample(name).is_file() for name in list_samples())
 
 
 def test_an_unknown_sample_is_an_error_that_lists_the_names():
-    with pytest.raises(InputError, match=r"'house'.*apartment, apartment_ifc2x3_mm, apartment_ifc4x3_m"):
+    with pytest.raises(InputError, match=r"'house'.*apartment, apartment_ifc2x3_mm, apartment_ifc4x3_m, office"):
         sample("house")
 
 
@@ -153,6 +153,12 @@ def test_the_samples_are_the_bytes_their_script_writes(data_ifc: Path, tmp_path:
     for path in written:
         assert path.read_bytes() == (data_ifc / path.name).read_bytes()
         assert path.stat().st_size < 300_000
+
+
+def test_the_office_is_the_bytes_its_script_writes(data_ifc: Path, tmp_path: Path, monkeypatch):
+    monkeypatch.syspath_prepend(data_ifc)  # it shares code with the script beside it
+    runpy.run_path(str(data_ifc / "make_office.py"))["write_office"](tmp_path / "office.ifc")
+    assert (tmp_path / "office.ifc").read_bytes() == (data_ifc / "office.ifc").read_bytes()
 
 
 def test_every_sample_has_a_line_in_the_readme(data_ifc: Path):
@@ -174,7 +180,7 @@ def test_a_sample_has_its_schema_and_unit(name, schema, scale):
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning")  # the rules are read from a file that is left open
-@every_apartment
+@pytest.mark.parametrize("name", [*APARTMENTS, "office"])
 def test_a_sample_is_valid_with_all_rules_of_its_schema(name):
     log = ifcopenshell.validate.json_logger()
     ifcopenshell.validate.validate(ifcopenshell.open(sample(name)), log, express_rules=True)

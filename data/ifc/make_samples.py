@@ -344,8 +344,9 @@ _REFERENCES_IN_IFC2X3 = {  # to dates and organizations; exporters write plain t
 class Author:
     """A model in the making. Lengths come in feet; names are unique and decide the GlobalIds."""
 
-    def __init__(self, variant: Variant) -> None:
+    def __init__(self, variant: Variant, name: str = "Apartment", known: Mapping[str, Kind] | None = None) -> None:
         self.variant = variant
+        self.known = KINDS if known is None else known
         self.model = project.create_file(variant.schema)
         self.builder = ShapeBuilder(self.model)
         self.kinds: dict[str, entity_instance] = {}
@@ -354,7 +355,7 @@ class Author:
             self.model, owner.add_person(self.model, "bimnav", "developers", "bimnav"), developer
         )
         owner.add_application(self.model, developer, "1", "bimnav samples", "bimnav samples")
-        self.project = self.root("IfcProject", "Apartment")
+        self.project = self.root("IfcProject", name)
         unit.assign_unit(self.model, self._units())
         solid, plan = (context.add_context(self.model, kind) for kind in ("Model", "Plan"))
         self.body = context.add_context(self.model, "Model", "Body", "MODEL_VIEW", parent=solid)
@@ -385,6 +386,11 @@ class Author:
         entity = root.create_entity(self.model, ifc_class, predefined, name)
         entity.GlobalId = _global_id(name)
         return entity
+
+    @staticmethod
+    def root_id(name: str) -> str:
+        """Return the GlobalId that goes with a name."""
+        return _global_id(name)
 
     def describe(self, entity: entity_instance, name: str, values: Mapping[str, Any]) -> None:
         """Give an entity a property set."""
@@ -440,7 +446,7 @@ class Author:
 
     def element(self, key: str, tag: int, container: entity_instance) -> entity_instance:
         """Create an element of a kind, named as Revit names it: family, type, element id."""
-        kind = KINDS[key]
+        kind = self.known[key]
         element = self.root(kind.ifc_class, f"{kind.family}:{tag}")
         element.Tag = str(tag)
         types.assign_type(self.model, [element], self._type(key))
@@ -450,7 +456,7 @@ class Author:
 
     def _type(self, key: str) -> entity_instance:
         if key not in self.kinds:
-            kind = KINDS[key]
+            kind = self.known[key]
             self.kinds[key] = entity = self.root(f"{kind.ifc_class}Type", kind.family, kind.predefined)
             if kind.solids:
                 self.shape(entity, kind.solids)

@@ -552,6 +552,23 @@ class Building:
             f"{len(self.doors)} doors, {len(self.elements)} elements, {len(self.issues)} issues)"
         )
 
+    def _repr_html_(self) -> str:
+        """Return a card for a notebook."""
+        from bimnav._cards import card, counted, plan_svg
+        from bimnav._indoors import outline
+
+        storeys = (f"{storey.name} ({storey.elevation:.2f} m)" for storey in self.storeys)
+        lowest = next((s.storey for s in self.spaces), None)
+        rooms = [outline(space.shapes) for space in self.spaces if space.storey == lowest and space.shapes]
+        rows = [
+            ("schema", f"{self.schema}, length unit {self.unit}"),
+            ("storeys", ", ".join(storeys)),
+            ("elements", counted(element.ifc_class.removeprefix("Ifc") for element in self.elements)),
+            ("spaces, doors", f"{len(self.spaces)}, {len(self.doors)}"),
+            ("issues", counted(f"{issue.severity}: {issue.code}" for issue in self.issues if issue.severity != "info")),
+        ]
+        return card(f"Building {self.name}", rows, plan_svg((room, "#dcd6ca") for room in rooms))
+
     @cached_property
     def _by_id(self) -> Mapping[str, Element]:
         return {element.global_id: element for element in self.elements}

@@ -205,6 +205,25 @@ class IndoorEnvironment:
             f"{len(self.regions)} regions, {len(self.obstacles)} obstacles, {len(self.targets)} targets)"
         )
 
+    def _repr_html_(self) -> str:
+        """Return a card for a notebook."""
+        from bimnav._cards import card, plan_svg
+
+        shown = self.ground
+        areas = [(r.polygon, "#e6e0d5") for r in self.regions if r.storey == shown]
+        areas += [(o.footprint, "#6b6459") for o in self.obstacles_on(shown)]
+        points = [(shapely.Point(t.destination).buffer(0.2), "#d55e00") for t in self.targets if t.storey == shown]
+        rows = [
+            ("task", self.task.name),
+            ("robot", f"{self.robot.name}, radius {self.robot.radius:g} m, height {self.robot.height:g} m"),
+            ("floor", f"{sum(self.floor(s).area for s in range(len(self.levels))):.1f} m² for its middle"),
+            ("obstacles", len(self.obstacles)),
+            ("targets", len(self.targets)),
+            ("zones", len(self.zones) or None),
+            ("issues", len(self.issues) or None),
+        ]
+        return card(f"Environment in {self.building.name}", rows, plan_svg([*areas, *points]))
+
     @cached_property
     def _floors(self) -> tuple[BaseGeometry, ...]:
         return tuple(

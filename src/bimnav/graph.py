@@ -158,6 +158,19 @@ class NavGraph:
         counts = ", ".join(f"{count} {kind.name.lower()}" for kind, count in self.counts.items())
         return f"NavGraph({storeys} x {rows} x {cols} cells of {self.frame.cell_size:g} m: {counts})"
 
+    def _repr_html_(self) -> str:
+        """Return a card for a notebook."""
+        from bimnav._cards import card
+
+        storeys, rows, cols = self.frame.shape
+        told = [
+            ("cells", f"{storeys} × {rows} × {cols} of {self.frame.cell_size:g} m, {self.connectivity} neighbors"),
+            *((kind.name.lower(), count) for kind, count in self.counts.items()),
+            ("conflicts", ", ".join(conflict.name for conflict in self.conflicts)),
+            ("connectors", len(self.connectors) or None),
+        ]
+        return card("Navigation graph", told)
+
     @cached_property
     def free(self) -> NDArray[np.bool_]:
         """(storeys, rows, cols) bool, where a robot can be."""

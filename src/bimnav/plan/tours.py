@@ -84,6 +84,26 @@ class Tour:
     def __repr__(self) -> str:
         return f"Tour({len(self.stops)} stops, {len(self.unreached)} unreached, {self.length:.3f} m)"
 
+    def _repr_html_(self) -> str:
+        """Return a card for a notebook."""
+        from bimnav._cards import card, plan_svg
+
+        environment, storey = self.graph.environment, self.start.storey
+        areas: list[Any] = []
+        if environment is not None:
+            areas += [(region.polygon, "#e6e0d5") for region in environment.regions if region.storey == storey]
+            areas += [(obstacle.footprint, "#6b6459") for obstacle in environment.obstacles_on(storey)]
+        level = self.graph.frame.elevations[storey]
+        lines = [(leg, "#0072b2") for leg in self.route if len(leg) > 1 and (abs(leg[:, 2] - level) < 1e-6).all()]
+        proved = "proved shortest" if self.is_optimal else f"at most {self.gap:.1%} above the shortest"
+        rows = [
+            ("length", f"{self.length:.2f} m, {proved}"),
+            ("stops", ", ".join(stop.name for stop in self.stops)),
+            ("not reached", ", ".join(f"{lost.name}: {lost.reason}" for lost in self.unreached)),
+            ("charging", ", ".join(f"{c.name}: {c.energy_wh:.1f} Wh" for c in self.charges)),
+        ]
+        return card(f"Tour of {len(self.stops)} stops", rows, plan_svg(areas, lines))
+
     @cached_property
     def length(self) -> float:
         """Of all legs, metres: along cells, or along straight legs where they were drawn."""

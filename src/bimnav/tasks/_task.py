@@ -299,6 +299,13 @@ class Task:
     entourage: Entourage = "ignore"
     source: str = field(default="", compare=False)
 
+    def _repr_html_(self) -> str:
+        """Return a card for a notebook."""
+        from bimnav._cards import card
+
+        lists = [(name, "; ".join(str(r.label or r.filter) for r in getattr(self, name))) for name in RULE_LISTS]
+        return card(f"Task {self.name}", [("", self.description), *lists, ("source", self.source)])
+
     def __post_init__(self) -> None:
         for name in RULE_LISTS:
             object.__setattr__(self, name, _rules(name, getattr(self, name)))
