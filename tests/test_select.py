@@ -250,6 +250,7 @@ def test_a_query_for_classes_alone_is_answered_as_from_the_file(model_name, monk
         "IfcWall, ! IfcWallStandardCase, IfcSlab + IfcSpace",
         "IfcOpeningElement",
         "IfcObject",
+        "IfcSanitaryTerminal, IfcLamp",
     )
     answers = [quick.select(query) for query in queries]
     monkeypatch.setattr(_query, "of_classes", lambda *_: None)

@@ -32,6 +32,8 @@ from bimnav.building import (
 
 __all__ = ["Model", "to_building"]
 
+_APART = ("step_id", "shapes", "type_class")  # columns that become no fields
+
 
 @dataclass(slots=True)
 class Model:
@@ -47,10 +49,10 @@ class Model:
         - `anchors`: `{global_id: placement}` of sites, buildings and storeys, (4, 4) metres
         - `storeys`: `[{global_id, name, elevation}]`, lowest first
         - `meshes`: `[{quality}]`, one per mesh of the arrays
-        - `elements`: `[{global_id, ifc_class, name, type_name, object_type, predefined_type, tag,
+        - `elements`: `[{global_id, ifc_class, name, type_name, type_class, object_type, predefined_type, tag,
           storey, space, parent, step_id, shapes: [index of a shape, ...]}]`
         - `terrain`: the same of surfaces of the ground
-        - `spaces`: `[{global_id, name, long_name, type_name, object_type, predefined_type, storey, step_id,
+        - `spaces`: `[{global_id, name, long_name, type_name, type_class, object_type, predefined_type, storey, step_id,
           shapes}]`
         - `openings`: `[{global_id, host, fillings: [global_id], shapes}]`
         - `doors`: `[{global_id, opening, width, height}]`
@@ -91,7 +93,7 @@ def to_building(
     shapes = _shapes_of(model)
 
     def with_shapes(row: Mapping[str, Any]) -> dict[str, Any]:
-        known = {name: value for name, value in row.items() if name not in ("step_id", "shapes")}
+        known = {name: value for name, value in row.items() if name not in _APART}
         return known | {"shapes": tuple(shapes[index] for index in row["shapes"])}
 
     elements = {row["global_id"]: Element(**with_shapes(row)) for row in tables["elements"]}

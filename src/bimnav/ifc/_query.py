@@ -60,23 +60,23 @@ def checked(query: str, schema: str) -> Any:
     return parse(query)
 
 
-def of_classes(tree: Any, classes: Mapping[str, str], schema: str) -> tuple[str, ...] | None:
+def of_classes(tree: Any, classes: Mapping[str, tuple[str, str]], schema: str) -> tuple[str, ...] | None:
     """Answer a query that asks for classes alone; None if it asks for anything else.
 
     Parameters
     ----------
     classes
-        GlobalIds of all products to their classes.
+        GlobalIds of all products to their classes and those of their types.
     """
     chosen: set[str] = set()
     for group in tree.find_data("facet_list"):
         part: set[str] | None = None
         for facet in group.children:
-            *signs, name = facet.children[0].children if facet.children[0].data == "entity" else (None,)
-            taken = taken_for(str(name.children[0]), schema) if name is not None else None
-            if taken is None or taken.by_type:
+            if facet.children[0].data != "entity":
                 return None
-            found = {global_id for global_id, known in classes.items() if is_a(known, taken.name, schema)}
+            *signs, name = facet.children[0].children
+            wanted, by_type = taken_for(str(name.children[0]), schema)
+            found = {g for g, known in classes.items() if wanted and is_a(known[by_type], wanted, schema)}
             part = (set(classes) if part is None else part) - found if signs else (part or set()) | found
         chosen |= part or set()
     return tuple(global_id for global_id in classes if global_id in chosen)

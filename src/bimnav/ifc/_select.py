@@ -20,7 +20,7 @@ def selector_for(path: Path, sha256: str, model: Model) -> Selector:
     """Return what answers for the elements and spaces of a model that was read from `path`."""
     rows = (*model.tables["elements"], *model.tables["spaces"])
     ids = {row["step_id"]: row["global_id"] for row in rows}
-    classes = {row["global_id"]: row.get("ifc_class", "IfcSpace") for row in rows}
+    classes = {row["global_id"]: (row.get("ifc_class", "IfcSpace"), row["type_class"]) for row in rows}
     return Selector(path.absolute(), sha256, ids, classes, model.tables["schema"])
 
 
@@ -37,13 +37,13 @@ class Selector:
         Step id to GlobalId of every product there is an answer about; two products with one GlobalId in
         the file have two here.
     classes
-        GlobalId to class of the same products.
+        GlobalId to class and class of the type, of the same products.
     schema
         Of the file.
     """
 
     def __init__(
-        self, path: Path, sha256: str, ids: Mapping[int, str], classes: Mapping[str, str], schema: str
+        self, path: Path, sha256: str, ids: Mapping[int, str], classes: Mapping[str, tuple[str, str]], schema: str
     ) -> None:
         self._path, self._sha256, self._ids = path, sha256, dict(ids)
         self._classes, self._schema = dict(classes), schema
@@ -54,7 +54,7 @@ class Selector:
         self._read_facts: Any = None
         self._assets: Any = None
 
-    def __reduce__(self) -> tuple[type[Selector], tuple[Path, str, dict[int, str], dict[str, str], str]]:
+    def __reduce__(self) -> tuple[type[Selector], tuple[Path, str, dict[int, str], dict[str, tuple[str, str]], str]]:
         return type(self), (self._path, self._sha256, self._ids, self._classes, self._schema)
 
     def select(self, query: str) -> tuple[str, ...]:
