@@ -136,6 +136,18 @@ def test_what_is_not_plainly_a_polyhedron_is_left_to_the_kernel(old: str, new: s
     assert not gathered({number: line.replace(old, new) for number, line in lines.items()})[0]
 
 
+@pytest.mark.parametrize("number", [2, 10, 11, 12, 3])
+def test_a_text_that_ends_anywhere_is_left_to_the_kernel(number: int):
+    lines = brep_of(*prism([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 1.0))
+    last = lines.pop(number)
+    whole_text = "".join(f"#{k}={line};\n" for k, line in lines.items()) + f"#{number}={last}"
+    for length in range(len(whole_text) - len(last), len(whole_text)):
+        text = np.frombuffer(whole_text[:length].encode(), np.uint8)
+        numbers, places = index(text)
+        order = np.argsort(numbers)
+        assert not gather(text, numbers[order], places[order], np.array([1]))[0]
+
+
 def test_a_number_given_twice_leaves_all_to_the_kernel():
     lines = brep_of(*prism([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 1.0))
     assert mesh_of(lines) is not None

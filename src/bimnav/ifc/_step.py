@@ -88,6 +88,11 @@ def _skip(text: Bytes, at: int) -> int:
 
 
 @_kernel
+def _byte(text: Bytes, at: int) -> int:
+    return text[at] if at < len(text) else 0
+
+
+@_kernel
 def _number_at(text: Bytes, at: int) -> tuple[int, int]:
     """Read the digits of a step id."""
     at = _skip(text, at)
@@ -121,12 +126,12 @@ def _references(text: Bytes, numbers: Ints, at: int, depth: int, rows: Ints, use
     """Add the rows of `((#1,#2))` to `rows`, where `depth` is 2; -1 entries if it is anything else."""
     for _ in range(depth):
         at = _skip(text, at)
-        if at >= len(text) or text[at] != _OPEN:
+        if _byte(text, at) != _OPEN:
             return rows, UNREADABLE
         at += 1
     while True:
         at = _skip(text, at)
-        if at >= len(text) or text[at] != _HASH:
+        if _byte(text, at) != _HASH:
             return rows, UNREADABLE
         at, number = _number_at(text, at + 1)
         row = _row_of(numbers, number)
@@ -137,36 +142,37 @@ def _references(text: Bytes, numbers: Ints, at: int, depth: int, rows: Ints, use
         rows[used] = row
         used += 1
         at = _skip(text, at)
-        if at >= len(text) or text[at] != _COMMA:
+        if _byte(text, at) != _COMMA:
             break
         at += 1
     for _ in range(depth):
         at = _skip(text, at)
-        if at >= len(text) or text[at] != _CLOSE:
+        if _byte(text, at) != _CLOSE:
             return rows, UNREADABLE
         at += 1
     at = _skip(text, at)
-    return rows, used if at < len(text) and text[at] == _SEMICOLON else UNREADABLE
+    return rows, used if _byte(text, at) == _SEMICOLON else UNREADABLE
 
 
 @_kernel
 def _bound(text: Bytes, numbers: Ints, at: int) -> tuple[int, bool]:
     """Read `(#1,.T.)`: the row of the loop, and whether it is to be taken as it is."""
     at = _skip(text, at)
-    if text[at] != _OPEN:
+    if _byte(text, at) != _OPEN:
         return UNREADABLE, True
     at = _skip(text, at + 1)
-    if text[at] != _HASH:
+    if _byte(text, at) != _HASH:
         return UNREADABLE, True
     at, number = _number_at(text, at + 1)
     at = _skip(text, at)
-    if text[at] != _COMMA:
+    if _byte(text, at) != _COMMA:
         return UNREADABLE, True
     at = _skip(text, at + 1)
-    if at + 2 >= len(text) or text[at] != _DOT or text[at + 2] != _DOT:
+    if _byte(text, at) != _DOT or _byte(text, at + 2) != _DOT:
         return UNREADABLE, True
     letter = text[at + 1] & ~_LOWER
-    return (_row_of(numbers, number) if letter in (_T, _F) else UNREADABLE), letter == _T
+    is_read = letter in (_T, _F) and _ends(text, at + 3)
+    return (_row_of(numbers, number) if is_read else UNREADABLE), letter == _T
 
 
 @_kernel
@@ -174,23 +180,30 @@ def _point(text: Bytes, at: int, point: Points) -> bool:
     """Read `((1.,2.5,-3.E-1))` into `point`; tell whether it is that."""
     for _ in range(2):
         at = _skip(text, at)
-        if text[at] != _OPEN:
+        if _byte(text, at) != _OPEN:
             return False
         at += 1
     for axis in range(3):
         at, point[axis] = _real(text, _skip(text, at))
         at = _skip(text, at)
-        if not math.isfinite(point[axis]) or at >= len(text) or text[at] != (_CLOSE if axis == 2 else _COMMA):
+        if not math.isfinite(point[axis]) or _byte(text, at) != (_CLOSE if axis == 2 else _COMMA):
             return False
         at += 1
-    return True
+    return _ends(text, at)
+
+
+@_kernel
+def _ends(text: Bytes, at: int) -> bool:
+    """Tell whether a statement ends here: `);`."""
+    at = _skip(text, at)
+    return _byte(text, at) == _CLOSE and _byte(text, _skip(text, at + 1)) == _SEMICOLON
 
 
 @_kernel
 def _real(text: Bytes, at: int) -> tuple[int, float]:
     """Read a number, to its last bit if it has up to 15 digits; nan if there is none."""
     is_negative = False
-    if at < len(text) and text[at] in (_PLUS, _MINUS):
+    if _byte(text, at) in (_PLUS, _MINUS):
         is_negative = text[at] == _MINUS
         at += 1
     whole, digits, power, seen, is_fraction = 0, 0, 0, False, False
@@ -209,10 +222,10 @@ def _real(text: Bytes, at: int) -> tuple[int, float]:
         else:
             break
         at += 1
-    if at < len(text) and text[at] & ~_LOWER == _E:
+    if _byte(text, at) & ~_LOWER == _E:
         at += 1
         is_small = False
-        if at < len(text) and text[at] in (_PLUS, _MINUS):
+        if _byte(text, at) in (_PLUS, _MINUS):
             is_small = text[at] == _MINUS
             at += 1
         at, exponent = _number_at(text, at)
