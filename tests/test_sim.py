@@ -100,10 +100,17 @@ def test_ten_metres_at_half_a_metre_per_second_and_thirty_seconds_of_work_take_f
         "idle": 0.0,
         "moving": 20.0,
         "working": 30.0,
+        "waiting": 0.0,
         "charging": 0.0,
+        "blocked": 0.0,
         "failed": 0.0,
+        "energy": 0.0,
+        "charge_distance": 0.0,
+        "utilisation": 1.0,
         "served": 1,
+        "given_up": 0,
         "unreached": 0,
+        "coverage": 1.0,
     }
     assert repr(result) == "SimResult('R1': 1 of 1 targets served, 10.00 m in 50.0 s, 7 events)"
 

@@ -81,7 +81,28 @@ if TYPE_CHECKING:
     from bimnav.robot import Robot as Robot
     from bimnav.robots import list_robots as list_robots, load_robot as load_robot
     from bimnav.samples import list_samples as list_samples, sample as sample
-    from bimnav.sim import SimResult as SimResult, simulate as simulate
+    from bimnav.sim import (
+        Chance as Chance,
+        Charger as Charger,
+        DoorLocks as DoorLocks,
+        DoorUnlocks as DoorUnlocks,
+        Emergency as Emergency,
+        Lift as Lift,
+        ObstacleAppears as ObstacleAppears,
+        ObstacleRemoved as ObstacleRemoved,
+        Passage as Passage,
+        Person as Person,
+        RobotFails as RobotFails,
+        Sensing as Sensing,
+        SimDoor as SimDoor,
+        SimResult as SimResult,
+        SpeedLimit as SpeedLimit,
+        TargetReported as TargetReported,
+        ZoneHazardous as ZoneHazardous,
+        egress_distances as egress_distances,
+        find_passages as find_passages,
+        simulate as simulate,
+    )
     from bimnav.stops import Stand as Stand, Stop as Stop, Unreached as Unreached
     from bimnav.tasks import (
         Overruled as Overruled,
@@ -133,7 +154,10 @@ _HOMES = {
     "bimnav.robot": "Robot",
     "bimnav.robots": "list_robots load_robot",
     "bimnav.samples": "list_samples sample",
-    "bimnav.sim": "SimResult simulate",
+    "bimnav.sim": (
+        "Chance Charger DoorLocks DoorUnlocks Emergency Lift ObstacleAppears ObstacleRemoved Passage Person RobotFails "
+        "Sensing SimDoor SimResult SpeedLimit TargetReported ZoneHazardous egress_distances find_passages simulate"
+    ),
     "bimnav.tasks": "Overruled Rule Standoff Task list_tasks load_task",
     "bimnav.topology": "Topology topology",
     "bimnav.verify": "Check check_path check_plan check_poses",

@@ -1,20 +1,63 @@
 """Plans played in simulated time. The only package that imports simpy.
 
-`simulate` plays a tour. Its result is an event log and the track of the robot: where it was, and what it
+`simulate` plays tours. Its result is an event log and the tracks of the robots: where each was, and what it
 did, at every moment.
 """
 
+from bimnav.sim.areas import Passage, SpeedLimit
+from bimnav.sim.chance import Chance
+from bimnav.sim.changes import (
+    DoorLocks,
+    DoorUnlocks,
+    Emergency,
+    ObstacleAppears,
+    ObstacleRemoved,
+    RobotFails,
+    Sensing,
+    TargetReported,
+    ZoneHazardous,
+)
+from bimnav.sim.clearance import Encounter
+from bimnav.sim.doors import SimDoor
+from bimnav.sim.egress import egress_cells, egress_distances
+from bimnav.sim.lifts import Lift
 from bimnav.sim.log import Event, EventLog
-from bimnav.sim.simulation import ServiceTime, SimResult, simulate
+from bimnav.sim.passages import find_passages
+from bimnav.sim.people import Person
+from bimnav.sim.result import SimResult, Tally
+from bimnav.sim.simulation import simulate
 from bimnav.sim.track import RobotState, RobotStatus, Track
+from bimnav.sim.world import Charger, Policy, ServiceTime
 
 __all__ = [
+    "Chance",
+    "Charger",
+    "DoorLocks",
+    "DoorUnlocks",
+    "Emergency",
+    "Encounter",
     "Event",
     "EventLog",
+    "Lift",
+    "ObstacleAppears",
+    "ObstacleRemoved",
+    "Passage",
+    "Person",
+    "Policy",
+    "RobotFails",
     "RobotState",
     "RobotStatus",
+    "Sensing",
     "ServiceTime",
+    "SimDoor",
     "SimResult",
+    "SpeedLimit",
+    "Tally",
+    "TargetReported",
     "Track",
+    "ZoneHazardous",
+    "egress_cells",
+    "egress_distances",
+    "find_passages",
     "simulate",
 ]

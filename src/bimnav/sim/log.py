@@ -6,10 +6,10 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeAlias
 
 from bimnav._files import write_text
 from bimnav.errors import MissingExtraError
@@ -21,27 +21,53 @@ if TYPE_CHECKING:
 __all__ = ["Event", "EventKind", "EventLog", "csv_text"]
 
 EventKind: TypeAlias = Literal[
-    "start", "unreached", "depart", "arrive", "begin_service", "end_service", "remove", "finish"
+    "start",
+    "unreached",
+    "depart",
+    "arrive",
+    "begin_service",
+    "end_service",
+    "remove",
+    "finish",
+    "wait",
+    "resume",
+    "open_door",
+    "call_lift",
+    "board_lift",
+    "leave_lift",
+    "charge",
+    "charged",
+    "sense",
+    "contact",
+    "replan",
+    "block",
+    "give_up",
+    "fail",
+    "recover",
+    "assign",
+    "change",
+    "emergency",
+    "park",
+    "end",
 ]
 
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")  # what breaks a line, a terminal or UTF-8
 _LIVE = tuple("=+-@\t\r")  # a spreadsheet takes a cell that begins like this for a formula
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened to a robot.
+class Event(NamedTuple):
+    """Something that happened to a robot, or to the world.
 
     Parameters
     ----------
     time
         Seconds.
     robot
-        Name of the robot.
+        Name of the robot; empty for a change of the world.
     event
         What happened.
     status
-        Of the robot, from this moment on.
+        Of the robot, from this moment on; empty for a change of the world.
     storey
         Name of the storey the robot is on.
     x, y, z
@@ -54,12 +80,16 @@ class Event:
         Why it happened.
     leg_distance
         Metres driven since the robot last departed.
+    battery
+        What is left in it, as a share of a full one; None for a robot that never tires.
+    asset
+        Maker, model and the like of the target, on arrival at a stop.
     """
 
     time: float
     robot: str
     event: EventKind
-    status: RobotStatus
+    status: RobotStatus | Literal[""]
     storey: str
     x: float
     y: float
@@ -68,6 +98,11 @@ class Event:
     target_name: str = ""
     cause: str = ""
     leg_distance: float = 0.0
+    battery: float | None = None
+    asset: str = ""
+
+
+_OPTIONAL = {"battery": None, "asset": ""}  # columns, and what they hold where they say nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +115,7 @@ class EventLog:
         The events.
     """
 
-    columns: ClassVar[tuple[str, ...]] = tuple(column.name for column in fields(Event))
+    columns: ClassVar[tuple[str, ...]] = Event._fields
 
     rows: tuple[Event, ...]
 
@@ -95,10 +130,12 @@ class EventLog:
 
     def to_records(self) -> list[dict[str, Any]]:
         """Return one dictionary per event, with the columns as keys."""
-        return [{column: getattr(row, column) for column in self.columns} for row in self.rows]
+        return [row._asdict() for row in self.rows]
 
     def to_csv(self, path: str | PathLike[str] | None = None) -> str:
         """Write the log as comma-separated values; see `csv_text`.
+
+        The columns `battery` and `asset` are left out if no row says anything in them.
 
         Parameters
         ----------
@@ -115,7 +152,11 @@ class EventLog:
         OutputError
             If the file cannot be written.
         """
-        text = csv_text(self.columns, ([getattr(row, column) for column in self.columns] for row in self.rows))
+        silent = {
+            name for name, nothing in _OPTIONAL.items() if all(getattr(row, name) == nothing for row in self.rows)
+        }
+        columns = [column for column in self.columns if column not in silent]
+        text = csv_text(columns, ([getattr(row, column) for column in columns] for row in self.rows))
         if path is not None:
             write_text(Path(path), text)
         return text
@@ -135,10 +176,10 @@ class EventLog:
         return pandas.DataFrame.from_records(self.to_records(), columns=list(self.columns))
 
 
-def csv_text(columns: Sequence[str], rows: Iterable[Iterable[float | str]]) -> str:
+def csv_text(columns: Sequence[str], rows: Iterable[Iterable[float | str | None]]) -> str:
     r"""Write a table as comma-separated values, the same bytes for the same table everywhere.
 
-    Numbers have six decimals. In texts, line ends and control characters become escapes such as `\n`, so
+    Numbers have six decimals; None is empty. In texts, line ends and control characters become escapes such as `\n`, so
     that one row is one line; a text that a spreadsheet would take for a formula begins with an apostrophe.
 
     Examples
@@ -155,7 +196,9 @@ def csv_text(columns: Sequence[str], rows: Iterable[Iterable[float | str]]) -> s
     return text.getvalue()
 
 
-def _cell(value: float | str) -> str:
+def _cell(value: float | str | None) -> str:
+    if value is None:
+        return ""
     if not isinstance(value, str):
         return f"{round(value, 6) + 0.0:.6f}"  # the sum turns -0.0 into 0.0
     text = _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), value)

@@ -1,333 +1,345 @@
-"""The simulation: a robot that drives its tour, and the world it changes."""
+"""The simulation: robots that do their tours, and the world that changes meanwhile."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
-from functools import cached_property
-from itertools import zip_longest
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 import simpy
-from numpy.typing import NDArray
 
-from bimnav.errors import SimulationError, ValueRangeError
+from bimnav.building import Element, Space
+from bimnav.errors import InputError, ValueRangeError
 from bimnav.robot import Robot
-from bimnav.sim.log import Event, EventKind, EventLog
-from bimnav.sim.track import RobotState, RobotStatus, Track, TrackRecorder
+from bimnav.sim.agents import Order, RobotAgent
+from bimnav.sim.areas import Passage, SpeedLimit
+from bimnav.sim.changes import Change, Sensing
+from bimnav.sim.doors import SimDoor, doors_in
+from bimnav.sim.happenings import doors_named, plan_changes
+from bimnav.sim.lifts import Lift
+from bimnav.sim.log import Event, EventLog
+from bimnav.sim.people import Person, Walker
+from bimnav.sim.result import SimResult, Tally
+from bimnav.sim.routes import cell_near
+from bimnav.sim.world import LATEST, Charger, Decision, Policy, ServiceTime, Setting, Speed, World
 
 if TYPE_CHECKING:
-    from bimnav.grid import GridFrame
+    from collections.abc import Callable
+
+    from bimnav.graph import NavGraph
     from bimnav.plan import Tour
-    from bimnav.stops import Stop, Unreached
 
-__all__ = ["ServiceTime", "SimResult", "simulate"]
-
-Process: TypeAlias = Generator[simpy.Event, Any, None]
-
-_LATEST = 1e10  # seconds; later, float64 no longer holds two microseconds
-_JOINED = 1e-6  # metres between the end of one leg and the start of the next
+__all__ = ["ServiceTime", "simulate"]
 
 
-class ServiceTime(Protocol):
-    """How long, in seconds, a robot stays at a stop."""
+@runtime_checkable
+class Plan(Protocol):
+    """Tours of several robots, as any planner of fleets gives them."""
 
-    def __call__(self, robot: Robot, stop: Stop, rng: np.random.Generator, /) -> float:
-        """Return seconds, finite and not below 0."""
+    @property
+    def tours(self) -> Sequence[Tour]:
+        """One for every robot."""
         ...
 
 
-@dataclass(frozen=True, eq=False)
-class SimResult:
-    """What happened when a tour was played.
-
-    Parameters
-    ----------
-    robot
-        The robot that drove.
-    tour
-        What it was told to do.
-    log
-        Every event.
-    track
-        Where it was, and what it did, at every moment.
-    targets
-        GlobalIds of all targets of the world, in tour or not.
-    storeys
-        Names of the storeys, by index.
-    """
-
-    robot: Robot
-    tour: Tour
-    log: EventLog
-    track: Track
-    targets: tuple[str, ...]
-    storeys: tuple[str, ...]
-
-    def __repr__(self) -> str:
-        return (
-            f"SimResult({self.robot.name!r}: {len(self.served)} of {len(self.targets)} targets served, "
-            f"{self.distance:.2f} m in {self.makespan:.1f} s, {len(self.log)} events)"
-        )
-
-    @property
-    def makespan(self) -> float:
-        """Seconds from the start to the last event."""
-        return float(self.track.times[-1] - self.track.times[0])
-
-    @property
-    def distance(self) -> float:
-        """Metres driven."""
-        return float(self.track.lengths.sum())
-
-    @cached_property
-    def served(self) -> tuple[str, ...]:
-        """GlobalIds of the targets that were served, in that order."""
-        return tuple(dict.fromkeys(row.target for row in self.log if row.event == "end_service"))
-
-    @property
-    def metrics(self) -> dict[str, float]:
-        """Makespan and seconds in every status, metres driven, numbers of targets served and unreached."""
-        return {
-            "makespan": self.makespan,
-            "distance": self.distance,
-            **{str(status): self.track.seconds_in(status) for status in RobotStatus},
-            "served": len(self.served),
-            "unreached": len(self.tour.unreached),
-        }
-
-    def state_at(self, time: float) -> RobotState:
-        """Return what the robot does at a time, and where.
-
-        Before the start and after the end the robot stands where it started and ended. At the time of an
-        event the state is the one after it.
-
-        Parameters
-        ----------
-        time
-            Seconds, on the clock of the log.
-        """
-        if math.isnan(time):
-            raise ValueRangeError("the time is not a number.", "Give seconds.")
-        track, row = self.track, int(self.track.rows_at(time))
-        x, y, z = track.points_at(time).tolist()
-        early = time < track.times[0]
-        stop = -1 if early else int(track.stops[row])
-        return RobotState(
-            time,
-            self.robot.name,
-            RobotStatus.IDLE if early else RobotStatus(str(track.statuses[row])),
-            x,
-            y,
-            z,
-            float(track.headings[row]),
-            self.storeys[track.storeys[row]],
-            self.tour.stops[stop].global_id if stop >= 0 else "",
-        )
-
-    def present_targets(self, time: float) -> tuple[str, ...]:
-        """Return the GlobalIds of the targets that are still there at a time; what was served is gone."""
-        gone = {row.target for row in self.log if row.event == "remove" and row.time <= time}
-        return tuple(target for target in self.targets if target not in gone)
-
-    def trajectory(self, step: float | None = None) -> NDArray[Any]:
-        """Return the motion as a table.
-
-        Parameters
-        ----------
-        step
-            Seconds between rows; None for a row wherever the motion changes.
-
-        Returns
-        -------
-        table : (n,) structured
-            Fields `time` (s), `x`, `y`, `z` (m), `heading` (rad) and `status` (text); times rise, and the
-            last row is the end.
-        """
-        return self.track.trajectory(step)
-
-    def route_rows(self) -> list[tuple[float, float, str, float]]:
-        """Return `(x, y, storey, time)` wherever the motion changes, in execution order: m, name, s."""
-        kept = self.track.kept_rows()
-        columns = self.track.points[kept, :2], self.track.storeys[kept], self.track.times[kept]
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        return [(x, y, self.storeys[storey], time) for (x, y), storey, time in rows]
-
-
 def simulate(
-    tour: Tour,
+    plan: Tour | Sequence[Tour] | Plan,
     *,
     robot: Robot | None = None,
+    robots: Sequence[Robot] | None = None,
+    events: Iterable[Change] = (),
+    people: Iterable[Person] = (),
+    doors: Iterable[SimDoor] = (),
+    lifts: Iterable[Lift] = (),
+    chargers: Iterable[Charger] | None = None,
+    passages: Iterable[Passage] = (),
+    speed_limits: Iterable[SpeedLimit] = (),
     service_time: ServiceTime | float | None = None,
+    speed: Speed | float | None = None,
+    sensing: Sensing | None = None,
+    policy: Decision | Policy = "replan",
+    patience: float = 120.0,
     rng: np.random.Generator | None = None,
-    start_time: float = 0.0,
+    start_time: float | Sequence[float] = 0.0,
+    until: float = math.inf,
+    on_event: Callable[[Event], None] | None = None,
+    history: bool = True,
 ) -> SimResult:
-    """Play a tour in simulated time.
+    """Play tours in simulated time.
 
-    The robot drives every leg at its speed, along the exact route, and works at every stop. A target that
-    was served is gone from the world.
+    Every robot drives its legs along the exact route and works at every stop. A target that was served is
+    gone from the world, if the task says so. At one instant, changes of the world come first, in the order
+    given; then robots go on in the order in which they began to wait for that instant, at the start in the
+    order of the plan. What robots know of the world, all of them know.
 
     Parameters
     ----------
-    tour
-        What to do; `plan_tour` makes one.
-    robot
-        Who does it. The default is the robot the environment was made for.
+    plan
+        A tour, several, or a plan with `tours`; `plan_tour` makes a tour.
+    robot, robots
+        Who does it. The default is the robot of the plan, else the one the environment was made for; several
+        are then called after it, with numbers. Names differ.
+    events
+        What happens to the world: `ObstacleAppears`, `DoorLocks`, `TargetReported`, `RobotFails`,
+        `ZoneHazardous`, `Emergency` and the like.
+    people
+        Who walks around; robots stand still for them.
+    doors
+        Doors that have to be opened, or are locked; other doors stand open.
+    lifts
+        Lifts; without one, a robot drives what rises steeply, too.
+    chargers
+        Where robots charge; the default is what the task names as docks.
+    passages
+        Floor that few robots may be on at a time; `find_passages` finds what is too narrow for two.
+    speed_limits
+        Floor on which robots drive more slowly.
     service_time
-        Seconds at every stop, or a function of robot, stop and generator. The default is what the task
-        says, else 0.
+        Seconds at every stop, a `Chance`, or a function of robot, stop and generator. The default is what the
+        stop, else the task, says, else 0.
+    speed
+        Cruising speed on a leg in metres per second, a `Chance`, or a function of robot and generator,
+        instead of the robot's.
+    sensing
+        How robots find obstacles that nobody told them of.
+    policy
+        What a robot does when its way is closed: `replan` finds another, else puts the target last, else
+        waits; `wait` waits; `give up` leaves the target. Or a function of robot, stop and the obstacle's name.
+    patience
+        Seconds a robot waits for a way, a door or a passage, before it gives the target up.
     rng
-        Source of chance for `service_time`. The default is a fixed one, so that equal inputs give equal
-        logs; pass your own to vary them.
+        Source of chance; every robot and every random walk has a stream of its own. The default is a fixed
+        one, so that equal inputs give equal logs; pass your own to vary them.
     start_time
-        Seconds on the clock when the robot starts.
+        Seconds on the clock when robots start; one number, or one for every robot.
+    until
+        Seconds on the clock when work ends; what is left then stays undone.
+    on_event
+        Called with every event as it happens.
+    history
+        Whether to keep log and tracks; without, memory stays flat however long the simulation is.
 
     Raises
     ------
     SimulationError
-        If a service time is no finite number of seconds from 0 on, or the route has gaps.
+        If a service time or a speed is no finite number, or a route has gaps.
     ValueRangeError
-        If the start time is not finite or too far from 0.
+        If a time is not finite or too far from 0.
+    InputError
+        If robots, or people, share a name, or their number is not that of the tours.
     """
-    if not abs(start_time) <= _LATEST:
+    tours = _tours_of(plan)
+    starts = _starts(start_time, len(tours))
+    fleet = _fleet(plan, tours, robot, robots)
+    events, people = tuple(events), tuple(people)
+    environment = tours[0].graph.environment
+    task = None if environment is None else environment.task
+    begin = min(starts)
+    if not until >= begin or patience != patience or patience < 0:
+        raise ValueRangeError(
+            f"until is {until}, patience is {patience}.", "Give seconds: an end after the start, 0 or more to wait."
+        )
+    streams = _streams(rng or np.random.default_rng(0), len(tours), people)
+    walkers = _walkers(people, tours[0].graph, streams[len(tours) :], begin)
+    named = [SimDoor(global_id, "open") for global_id in doors_named(events)]
+    given = {door.global_id: door for door in (*named, *doors)}
+    setting = Setting(
+        service_time=_default_service(task) if service_time is None else service_time,
+        speed=speed,
+        sensing=sensing or Sensing(),
+        policy=policy,
+        patience=patience,
+        start_times=starts,
+        doors=doors_in(environment, given.values()),
+        passages=tuple(passages),
+        lifts=tuple(lifts),
+        limits=tuple(speed_limits),
+        chargers=_docks_of(tours[0].graph, fleet) if chargers is None else tuple(chargers),
+        walkers=walkers,
+        is_eventful=bool(events or people or math.isfinite(until) or any(math.isfinite(r.battery_wh) for r in fleet)),
+        keeps_history=history,
+    )
+    targets = _targets_of(tours)
+    log: list[Event] = []
+    world = World(
+        simpy.Environment(begin),
+        _storey_names(tours[0]),
+        setting,
+        cell_size=tours[0].graph.frame.cell_size,
+        targets=list(targets),
+        removable=set(targets) if task is None or task.removes_targets else set(),
+        write=_writer(log if history else None, on_event),
+    )
+    plan_changes(world, events)
+    if math.isfinite(until):
+        _end_at(world, until)
+    for index, (each, tour, stream) in enumerate(zip(fleet, tours, streams, strict=False)):
+        world.agents.append(RobotAgent(world, index, each, tour, stream))
+    world.clock.run()
+    return _result(world, fleet, tours, EventLog(tuple(log)), people, begin)
+
+
+def _result(
+    world: World, fleet: Sequence[Robot], tours: Sequence[Tour], log: EventLog, people: Sequence[Person], begin: float
+) -> SimResult:
+    for agent in world.agents:
+        agent.close_books()
+    unreached = [lost.global_id for tour in tours for lost in tour.unreached]
+    return SimResult(
+        tuple(fleet),
+        tuple(tours),
+        log,
+        tuple(agent.recorder.finish() for agent in world.agents) if world.setting.keeps_history else (),
+        tuple(
+            Tally(
+                agent.seconds,
+                agent.distance,
+                agent.charge_distance,
+                agent.battery.used,
+                agent.battery.charged,
+                agent.battery.level,
+                tuple(agent.served),
+            )
+            for agent in world.agents
+        ),
+        tuple(tuple(agent.stops) for agent in world.agents),
+        tuple(dict.fromkeys(world.targets)),
+        tuple(world.given_up),
+        (*unreached, *(lost.global_id for lost in world.unreached)),
+        world.storeys,
+        (begin, max(agent.last for agent in world.agents)),
+        tuple(people),
+        world.setting.walkers,
+    )
+
+
+def _tours_of(plan: Tour | Sequence[Tour] | Plan) -> tuple[Tour, ...]:
+    listed: Any = getattr(plan, "tours", None)
+    tours: Sequence[Any] = listed if listed is not None else plan if isinstance(plan, Sequence) else (plan,)
+    if not len(tours):
+        raise InputError("there is no tour to play.", "Give at least one.")
+    return tuple(tours)
+
+
+def _starts(start_time: float | Sequence[float], count: int) -> tuple[float, ...]:
+    starts = tuple(start_time) if isinstance(start_time, Sequence) else (start_time,) * count
+    if len(starts) != count or not all(abs(start) <= LATEST for start in starts):
         raise ValueRangeError(
             f"start_time is {start_time}.",
-            f"Give seconds from {-_LATEST:g} to {_LATEST:g}.",
+            f"Give seconds from {-LATEST:g} to {LATEST:g}, one number or one for every robot.",
             {"start_time": start_time},
         )
-    environment = tour.graph.environment
-    if robot is None:
-        robot = Robot() if environment is None else environment.robot
-    if service_time is None:
-        service_time = environment.task.service_time if environment is not None else 0.0
-    rng = rng or np.random.default_rng(0)
-
-    targets = _targets_of(tour)
-    removable = targets if environment is None or environment.task.removes_targets else ()
-    world = _World(simpy.Environment(start_time), tour.graph.frame, _storey_names(tour), set(removable))
-    agent = _RobotAgent(robot, world, tour.start_point, tour.start.storey)
-    world.clock.process(agent.execute(tour, lambda stop: _seconds_at(stop, robot, service_time, rng)))
-    world.clock.run()
-    return SimResult(robot, tour, EventLog(tuple(world.log)), agent.recorder.finish(), targets, world.storeys)
+    return starts
 
 
-@dataclass(slots=True)
-class _World:
-    """What all agents share: the clock, the targets that are still there, and the log."""
-
-    clock: simpy.Environment
-    frame: GridFrame
-    storeys: tuple[str, ...]
-    removable: set[str]  # targets still there that are taken away when served; asked and emptied, never iterated
-    log: list[Event] = field(default_factory=list)
-
-    def pass_time(self, seconds: float) -> simpy.Event:
-        """Return the event that this many seconds have passed."""
-        if not (seconds >= 0 and self.clock.now + seconds <= _LATEST):  # nan would corrupt simpy's queue
-            raise SimulationError(
-                f"the simulation would reach {self.clock.now + seconds:g} s.",
-                f"It ends at {_LATEST:g} s; check the speed and the service times.",
-            )
-        return self.clock.timeout(seconds)
-
-
-class _RobotAgent:
-    """A robot at work: it drives, serves, and writes down what it does."""
-
-    def __init__(self, robot: Robot, world: _World, point: tuple[float, float, float], storey: int) -> None:
-        self.robot, self.world = robot, world
-        self.status = RobotStatus.IDLE
-        self.point = np.asarray(point, dtype=np.float64)
-        self.storey = storey
-        self.leg_distance = 0.0
-        self.recorder = TrackRecorder()
-
-    def note(self, event: EventKind, target: Stop | Unreached | None = None, cause: str = "") -> None:
-        """Write an event in the log."""
-        x, y, z = self.point.tolist()
-        self.world.log.append(
-            Event(
-                time=float(self.world.clock.now),
-                robot=self.robot.name,
-                event=event,
-                status=self.status,
-                storey=self.world.storeys[self.storey],
-                x=x,
-                y=y,
-                z=z,
-                target=target.global_id if target else "",
-                target_name=target.name if target else "",
-                cause=cause,
-                leg_distance=self.leg_distance,
-            )
+def _fleet(
+    plan: object, tours: Sequence[Tour], robot: Robot | None, robots: Sequence[Robot] | None
+) -> tuple[Robot, ...]:
+    if robot is not None and robots is not None:
+        raise InputError("both robot and robots are given.", "Give one of them.")
+    if robots is None and robot is None:
+        robots = getattr(plan, "robots", None) or None
+    if robots is not None:
+        fleet = tuple(robots)
+    else:
+        environment = tours[0].graph.environment
+        robot = robot or (Robot() if environment is None else environment.robot)
+        own = [getattr(tour, "robot", None) or robot for tour in tours]
+        names = [each.name for each in own]
+        if len(set(names)) < len(names):
+            own = [replace(each, name=f"{each.name}-{k + 1}") for k, each in enumerate(own)]
+        fleet = tuple(own)
+    names = [each.name for each in fleet]
+    if len(fleet) != len(tours) or len(set(names)) < len(names):
+        raise InputError(
+            f"{len(fleet)} robots called {', '.join(map(repr, names[:9]))} do {len(tours)} tours.",
+            "Give one robot for every tour, each with a name of its own.",
         )
-
-    def execute(self, tour: Tour, seconds_at: Callable[[Stop], float]) -> Process:
-        """Drive to every stop in turn and serve it, then back to the start if the tour says so."""
-        self.note("start")
-        for lost in tour.unreached:
-            self.note("unreached", lost, lost.reason)
-        for k, (leg, stop) in enumerate(zip_longest(_legs_of(tour), tour.stops)):
-            if stop is None:
-                yield from self.drive(leg, -1, None, tour.start.storey)
-            else:
-                yield from self.drive(leg, k, stop, stop.cell.storey)
-                yield from self.serve(stop, k, seconds_at)
-        self.note("finish", cause="back at the start" if tour.return_to_start else "no stop is left")
-        self.record()
-
-    def drive(self, leg: NDArray[np.float64], index: int, stop: Stop | None, storey: int) -> Process:
-        """Drive along a leg at cruising speed; one event, however many points it has."""
-        reached = np.append(0.0, np.linalg.norm(np.diff(leg, axis=0), axis=1).cumsum())
-        passed = reached / self.robot.speed
-        self.status, self.leg_distance = RobotStatus.MOVING, 0.0
-        self.note("depart", stop, "next stop" if stop else "return to the start")
-        storeys = _storeys_along(leg, self.world.frame, self.storey, storey)
-        self.recorder.add(self.world.clock.now + passed, leg, self.status, storeys, index)
-        yield self.world.pass_time(float(passed[-1]))
-        self.status, self.leg_distance = RobotStatus.IDLE, float(reached[-1])
-        self.point, self.storey = leg[-1], storey
-        self.note("arrive", stop, stop.approach if stop else "")
-
-    def serve(self, stop: Stop, index: int, seconds_at: Callable[[Stop], float]) -> Process:
-        """Work at a stop; litter is gone when it was served."""
-        self.status = RobotStatus.WORKING
-        self.note("begin_service", stop)
-        self.record(index)
-        yield self.world.pass_time(seconds_at(stop))
-        self.status = RobotStatus.IDLE
-        self.note("end_service", stop)
-        if stop.global_id in self.world.removable:
-            self.world.removable.remove(stop.global_id)
-            self.note("remove", stop, "served")
-
-    def record(self, index: int = -1) -> None:
-        """Begin a row of the track here and now."""
-        self.recorder.add([self.world.clock.now], [self.point], self.status, [self.storey], index)
+    return fleet
 
 
-def _seconds_at(stop: Stop, robot: Robot, service_time: ServiceTime | float, rng: np.random.Generator) -> float:
-    hint = "Give seconds from 0 on, or a function of robot, stop and generator that returns them."
-    context = {"global_id": stop.global_id, "name": stop.name}
-    try:
-        seconds = float(service_time(robot, stop, rng) if callable(service_time) else service_time)
-    except Exception as error:
-        message = f"the service time of stop {stop.name!r} ({stop.global_id}) cannot be had: {error!r}."
-        raise SimulationError(message, hint, context) from error
-    if not (math.isfinite(seconds) and seconds >= 0):
-        message = f"the service time of stop {stop.name!r} ({stop.global_id}) is {seconds}."
-        raise SimulationError(message, hint, context)
+def _streams(rng: np.random.Generator, robots: int, people: Sequence[Person]) -> list[np.random.Generator]:
+    """Return a source of chance for every robot and person; a robot alone takes the given one."""
+    if robots == 1 and not people:
+        return [rng]
+    return list(rng.spawn(robots + len(people)))
+
+
+def _walkers(
+    people: Sequence[Person], graph: NavGraph, streams: Sequence[np.random.Generator], begin: float
+) -> tuple[Walker, ...]:
+    if len({person.name for person in people}) < len(people):
+        raise InputError("two people share a name.", "Give each a name of their own.")
+    return tuple(Walker(person, graph, stream, begin) for person, stream in zip(people, streams, strict=True))
+
+
+def _default_service(task: Any) -> ServiceTime | float:
+    """Return what stops, else the task, say about service times."""
+    usual = 0.0 if task is None else float(task.service_time)
+
+    def seconds(_: Robot, stop: Any, __: np.random.Generator, /) -> float:
+        own = getattr(stop, "service_time", None)
+        return usual if own is None else float(own)
+
     return seconds
 
 
-def _targets_of(tour: Tour) -> tuple[str, ...]:
-    """Return the GlobalIds of everything there is to visit, also of what the tour leaves out."""
-    environment = tour.graph.environment
+def _docks_of(graph: NavGraph, fleet: Sequence[Robot]) -> tuple[Charger, ...]:
+    """Return the chargers that the task names, for robots that tire."""
+    environment = graph.environment
+    if environment is None or not any(math.isfinite(robot.battery_wh) for robot in fleet):
+        return ()
+    from bimnav.tasks import match
+
+    found: dict[str, Element | Space] = {
+        p.global_id: p for rule in environment.task.docks for p, _ in match(rule, environment.building)
+    }
+    chargers = []
+    for product in found.values():
+        bounds = product.bounds
+        if bounds is None:
+            continue
+        x, y = ((bounds[0, :2] + bounds[1, :2]) / 2).tolist()
+        storey = graph.frame.storey_at(float(bounds[0, 2]))
+        cell = cell_near(graph, (x, y, graph.frame.elevations[storey]), storey)
+        if cell is not None:
+            chargers.append(Charger(product.global_id, cell, graph.frame.center_of(cell)))
+    return tuple(chargers)
+
+
+def _writer(log: list[Event] | None, on_event: Callable[[Event], None] | None) -> Callable[[Event], None]:
+    if on_event is None:
+        return (lambda _: None) if log is None else log.append
+    told = on_event
+
+    def write(event: Event) -> None:
+        if log is not None:
+            log.append(event)
+        told(event)
+
+    return write
+
+
+def _end_at(world: World, until: float) -> None:
+    moment = world.pass_time(until - float(world.clock.now))
+    assert moment.callbacks is not None  # noqa: S101 - it lies ahead
+
+    def end(_: simpy.Event) -> None:
+        for agent in world.agents:
+            agent.disturb(Order("end", "time is up"))
+
+    moment.callbacks.append(end)
+
+
+def _targets_of(tours: Sequence[Tour]) -> tuple[str, ...]:
+    """Return the GlobalIds of everything there is to visit, also of what the tours leave out."""
+    environment = tours[0].graph.environment
     known = [] if environment is None else [target.global_id for target in environment.targets]
-    planned = [goal.global_id for goal in tour.stops] + [goal.global_id for goal in tour.unreached]
-    return tuple(dict.fromkeys(known + planned))
+    planned = [stop.global_id for tour in tours for stop in tour.stops]
+    lost = [target.global_id for tour in tours for target in tour.unreached]
+    return tuple(dict.fromkeys(known + planned + lost))
 
 
 def _storey_names(tour: Tour) -> tuple[str, ...]:
@@ -335,37 +347,3 @@ def _storey_names(tour: Tour) -> tuple[str, ...]:
     if environment is None:
         return tuple(str(index) for index in range(len(tour.graph.frame.elevations)))
     return tuple(storey.name or str(index) for index, storey in enumerate(environment.storeys))
-
-
-def _legs_of(tour: Tour) -> list[NDArray[np.float64]]:
-    """Return the route as arrays that begin where the last one ended and end where the stop says."""
-    ends = [stop.end for stop in tour.stops]
-    if tour.return_to_start and len(tour.route) > len(ends):
-        ends.append(tour.start_point)
-    if len(tour.route) != len(ends):
-        raise SimulationError(f"a tour of {len(tour.stops)} stops has {len(tour.route)} legs.")
-    legs, here = [], tour.start_point
-    for k, (polyline, end) in enumerate(zip(tour.route, ends, strict=True)):
-        leg = np.asarray(polyline, dtype=np.float64)
-        if leg.ndim != 2 or leg.shape[1] != 3 or not len(leg) or not np.isfinite(leg).all():
-            raise SimulationError(f"leg {k} of the tour is no polyline of finite points.", "", {"leg": k})
-        gaps = math.dist(here, leg[0]), math.dist(leg[-1], end)
-        if max(gaps) > _JOINED:
-            raise SimulationError(
-                f"leg {k} of the tour begins {gaps[0]:.6g} m from where the robot is "
-                f"and ends {gaps[1]:.6g} m from where it should stop.",
-                "A route is one unbroken line through the ends of its stops.",
-                {"leg": k},
-            )
-        legs.append(leg)
-        here = end
-    return legs
-
-
-def _storeys_along(leg: NDArray[np.float64], frame: GridFrame, before: int, after: int) -> NDArray[np.int32]:
-    """Return the storey of every point: the one it comes from or goes to at their heights, else the one below."""
-    heights, index = np.unique(leg[:, 2], return_inverse=True)
-    storeys = np.array([frame.storey_at(z) for z in heights.tolist()], dtype=np.int32)
-    for storey in (after, before):
-        storeys[np.abs(heights - frame.elevations[storey]) <= _JOINED] = storey
-    return storeys[index]

@@ -6,15 +6,19 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bimnav.errors import SimulationError, ValueRangeError
 
-__all__ = ["RobotState", "RobotStatus", "Track", "TrackRecorder"]
+if TYPE_CHECKING:
+    from bimnav.sim.motion import Motion
 
+__all__ = ["RobotState", "RobotStatus", "Track", "TrackRecorder", "wrapped"]
+
+_ROUNDING = 1e-6  # seconds
 _STILL = 1e-9  # metres; a shorter move is rounding and turns no robot
 _TRAJECTORY = np.dtype([*((name, np.float64) for name in ("time", "x", "y", "z", "heading")), ("status", "U8")])
 _MOST_ROWS = 10_000_000  # of a trajectory cut into steps
@@ -26,7 +30,9 @@ class RobotStatus(StrEnum):
     IDLE = "idle"
     MOVING = "moving"
     WORKING = "working"
+    WAITING = "waiting"
     CHARGING = "charging"
+    BLOCKED = "blocked"
     FAILED = "failed"
 
 
@@ -66,7 +72,7 @@ class Track:
     """The motion of one robot, exact at every moment.
 
     Row k holds from `times[k]` until `times[k + 1]`, the last row from then on. Between two rows the robot
-    moves straight at constant speed.
+    moves straight with constant acceleration, or turns on the spot at constant rate.
 
     Parameters
     ----------
@@ -74,7 +80,11 @@ class Track:
     points : (n, 3) float64, world points in metres
     statuses : (n,) str of `RobotStatus`
     storeys : (n,) int32, indexes of storeys
-    stops : (n,) int32, indexes into the tour's stops; -1 for none
+    stops : (n,) int32, indexes into the robot's stops; -1 for none
+    eases : (n,) float64
+        Speed at the start of a row divided by its mean speed: 1 is constant, 0 from rest, 2 to rest.
+    turns : (n,) float64
+        How far the robot turns on the spot during a row, radians counter-clockwise.
     """
 
     times: NDArray[np.float64]
@@ -82,20 +92,28 @@ class Track:
     statuses: NDArray[np.str_]
     storeys: NDArray[np.int32]
     stops: NDArray[np.int32]
+    eases: NDArray[np.float64] = None  # type: ignore[assignment]  # ones
+    turns: NDArray[np.float64] = None  # type: ignore[assignment]  # zeros
 
     def __post_init__(self) -> None:
+        n = len(self.times)
+        for name, fill in (("eases", np.ones), ("turns", np.zeros)):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, fill(n))
         for name, dtype in (
             ("times", np.float64),
             ("points", np.float64),
             ("statuses", np.str_),
             ("storeys", np.int32),
             ("stops", np.int32),
+            ("eases", np.float64),
+            ("turns", np.float64),
         ):
             array = np.array(getattr(self, name), dtype=dtype)  # a private copy
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        n = len(self.times)
-        if not n or self.points.shape != (n, 3) or not len(self.statuses) == len(self.storeys) == len(self.stops) == n:
+        columns = (self.statuses, self.storeys, self.stops, self.eases, self.turns)
+        if not n or self.points.shape != (n, 3) or any(len(column) != n for column in columns):
             raise SimulationError(f"a track of {n} times and points of shape {self.points.shape} is none.")
         if not (np.isfinite(self.times).all() and np.isfinite(self.points).all() and (np.diff(self.times) >= 0).all()):
             raise SimulationError("a track has times or points that are not finite, or times that fall.")
@@ -108,13 +126,27 @@ class Track:
 
     @cached_property
     def headings(self) -> NDArray[np.float64]:
-        """(n,) float64, radians; a robot that stands faces where it came from, or first goes to."""
+        """(n,) float64, radians, as each row begins.
+
+        A robot that stands faces where it came from, or first goes to, and where it has turned since.
+        """
+        n = len(self.times)
         dx, dy = np.diff(self.points[:, :2], axis=0, append=self.points[-1:, :2]).T
-        turns = np.flatnonzero(np.hypot(dx, dy) > _STILL)
-        if not len(turns):
-            return np.zeros(len(self.times))
-        last = np.searchsorted(turns, np.arange(len(self.times)), side="right") - 1
-        headings: NDArray[np.float64] = np.arctan2(dy, dx)[turns[np.maximum(last, 0)]]
+        moves = np.flatnonzero(np.hypot(dx, dy) > _STILL)
+        turned = np.append(0.0, self.turns.cumsum())[:n]
+        if not len(moves):
+            return turned
+        last = np.searchsorted(moves, np.arange(n), side="right") - 1
+        base = moves[np.maximum(last, 0)]
+        since = np.where(last >= 0, turned - turned[base], 0.0)
+        headings: NDArray[np.float64] = np.arctan2(dy, dx)[base]
+        return np.where(since == 0, headings, wrapped(headings + since))
+
+    def headings_at(self, times: ArrayLike) -> NDArray[np.float64]:
+        """Return which way the robot faces at given seconds: (m,) to (m,) radians."""
+        rows = self.rows_at(times)
+        part = self.turns[rows] * self._share(rows, times)
+        headings: NDArray[np.float64] = np.where(part == 0, self.headings[rows], wrapped(self.headings[rows] + part))
         return headings
 
     def rows_at(self, times: ArrayLike) -> NDArray[np.int64]:
@@ -126,11 +158,18 @@ class Track:
         """Return where the robot is at given seconds: (m,) to (m, 3) metres."""
         rows = self.rows_at(times)
         after = np.minimum(rows + 1, len(self.times) - 1)
+        share, ease = self._share(rows, times), self.eases[rows]
+        driven = (share * (ease + (1 - ease) * share))[..., None]
+        points: NDArray[np.float64] = self.points[rows] + driven * (self.points[after] - self.points[rows])
+        return points
+
+    def _share(self, rows: NDArray[np.int64], times: ArrayLike) -> NDArray[np.float64]:
+        """Return which part of its row has passed at each time, 0 to 1."""
+        after = np.minimum(rows + 1, len(self.times) - 1)
         span = self.times[after] - self.times[rows]
         passed = np.clip(np.asarray(times) - self.times[rows], 0, span)
-        share = np.divide(passed, span, out=np.zeros_like(span), where=span > 0)[..., None]
-        points: NDArray[np.float64] = self.points[rows] + share * (self.points[after] - self.points[rows])
-        return points
+        share: NDArray[np.float64] = np.divide(passed, span, out=np.zeros_like(span), where=span > 0)
+        return share
 
     def kept_rows(self) -> NDArray[np.int64]:
         """Return the rows that last: of several at one time, the last."""
@@ -157,34 +196,40 @@ class Track:
             times = np.append(times[times < end], end)
         rows = self.rows_at(times)
         table = np.empty(len(times), dtype=_TRAJECTORY)
-        columns = (times, *self.points_at(times).T, self.headings[rows], self.statuses[rows])
+        columns = (times, *self.points_at(times).T, self.headings_at(times), self.statuses[rows])
         for name, column in zip(table.dtype.names or (), columns, strict=True):
             table[name] = column
         return table
+
+
+def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return angles as the equal ones from -pi to pi, radians."""
+    turned: NDArray[np.float64] = np.remainder(angle + math.pi, 2 * math.pi) - math.pi
+    return turned
 
 
 @dataclass(slots=True)
 class TrackRecorder:
     """Collects the rows of a track, piece by piece."""
 
-    pieces: list[tuple[NDArray[np.float64], NDArray[np.float64], RobotStatus, NDArray[np.int32], int]] = field(
-        default_factory=list
-    )
+    pieces: list[tuple[float, Motion, str, int]] = field(default_factory=list)
 
-    def add(self, times: ArrayLike, points: ArrayLike, status: RobotStatus, storeys: ArrayLike, stop: int) -> None:
-        """Add rows: (m,) seconds, (m, 3) metres and (m,) storeys, all with one status and one stop."""
-        self.pieces.append(
-            (np.asarray(times, np.float64), np.asarray(points, np.float64), status, np.asarray(storeys, np.int32), stop)
-        )
+    def add(self, begin: float, motion: Motion, status: RobotStatus, stop: int) -> None:
+        """Add the rows of a motion that began at a time, all with one status and one stop."""
+        self.pieces.append((begin, motion, str(status), stop))
 
     def finish(self) -> Track:
         """Return everything that was added as one track."""
-        times, points, statuses, storeys, stops = zip(*self.pieces, strict=True)
-        sizes = [len(piece) for piece in times]
+        begins, motions, statuses, stops = zip(*self.pieces, strict=True)
+        sizes = [len(motion.times) for motion in motions]
+        times = np.concatenate([begin + motion.times for begin, motion in zip(begins, motions, strict=True)])
+        level = np.maximum.accumulate(times)  # the clock adds up pieces of a motion, and rounds
         return Track(
-            np.concatenate(times),
-            np.concatenate(points),
-            np.repeat([str(status) for status in statuses], sizes),
-            np.concatenate(storeys),
+            np.where(level - times <= _ROUNDING, level, times),
+            np.concatenate([motion.points for motion in motions]),
+            np.repeat(statuses, sizes),
+            np.concatenate([motion.storeys for motion in motions]),
             np.repeat(stops, sizes),
+            np.concatenate([motion.eases for motion in motions]),
+            np.concatenate([motion.turns for motion in motions]),
         )

@@ -1,0 +1,182 @@
+"""Where routes cross areas of a storey: doorways, narrow passages, stretches with a speed limit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bimnav.errors import ValueRangeError
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+__all__ = ["Crossing", "Passage", "SpeedLimit", "crossings", "cut_at"]
+
+_TOUCH = 1e-6  # metres; a route that only touches an area does not cross it
+_JOIN = 1e-6  # metres between two crossings that are one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passage:
+    """Floor that few robots may be on at a time: a narrow corridor, a doorway, a lift lobby.
+
+    Parameters
+    ----------
+    name
+        How the log calls it.
+    polygon
+        Plan view in world coordinates, metres: where the middle of a robot uses it.
+    storey
+        Index of the storey.
+    capacity
+        How many robots may be on it at a time.
+    """
+
+    name: str
+    polygon: BaseGeometry
+    storey: int = 0
+    capacity: int = 1
+
+    def __post_init__(self) -> None:
+        if self.capacity < 1 or self.polygon.is_empty:
+            raise ValueRangeError(
+                f"passage {self.name!r} takes {self.capacity} robots on {self.polygon.area:g} m².",
+                "Give a polygon with area, and a capacity of at least 1.",
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpeedLimit:
+    """Floor on which robots drive no faster than a speed.
+
+    Parameters
+    ----------
+    polygon
+        Plan view in world coordinates, metres.
+    speed
+        Metres per second.
+    storey
+        Index of the storey; what rises from it, such as a stair or a ramp, belongs to it.
+    """
+
+    polygon: BaseGeometry
+    speed: float
+    storey: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.speed < math.inf:
+            raise ValueRangeError(f"a speed limit of {self.speed} m/s is none.", "Give a speed above 0.")
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """A part of a line inside an area: metres along the line, and the index of the area."""
+
+    begin: float
+    end: float
+    area: int
+
+
+def crossings(
+    points: NDArray[np.float64], storeys: NDArray[np.int32], areas: Sequence[tuple[BaseGeometry, int]]
+) -> list[Crossing]:
+    """Find where a line lies inside areas of its storeys.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, metres
+    storeys : (n,) int32, of every point; a piece between two storeys belongs to that of its first point
+    areas
+        Polygon and storey of each.
+
+    Returns
+    -------
+    crossings
+        By begin, then area; touching pieces of one area are one crossing.
+    """
+    if not areas or len(points) < 2:
+        return []
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    reached = np.append(0.0, steps.cumsum())
+    lines = shapely.linestrings(np.stack([points[:-1, :2], points[1:, :2]], axis=1))
+    found: list[list[tuple[float, float]]] = [[] for _ in areas]
+    for index, (polygon, storey) in enumerate(areas):
+        near = np.flatnonzero((storeys[:-1] == storey) & shapely.intersects(lines, polygon))
+        for k in near.tolist():
+            for begin, end in _inside(points[k, :2], points[k + 1, :2], shapely.intersection(lines[k], polygon)):
+                found[index].append((reached[k] + begin * steps[k], reached[k] + end * steps[k]))
+    merged = [
+        Crossing(begin, end, index)
+        for index, parts in enumerate(found)
+        for begin, end in _joined(parts)
+        if end - begin > _TOUCH
+    ]
+    return sorted(merged, key=lambda crossing: (crossing.begin, crossing.area))
+
+
+def _inside(a: NDArray[np.float64], b: NDArray[np.float64], part: BaseGeometry) -> list[tuple[float, float]]:
+    """Return the shares of a piece from a to b that an intersection with it covers."""
+    way = b - a
+    square = float(way @ way)
+    if square == 0:
+        return []
+    shares = []
+    for piece in shapely.get_parts(part).tolist():
+        along = ((shapely.get_coordinates(piece) - a) @ way / square).clip(0, 1)
+        shares.append((float(along.min()), float(along.max())))
+    return sorted(shares)
+
+
+def _joined(parts: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    joined: list[tuple[float, float]] = []
+    for begin, end in sorted(parts):
+        if joined and begin - joined[-1][1] <= _JOIN:
+            joined[-1] = (joined[-1][0], max(joined[-1][1], end))
+        else:
+            joined.append((begin, end))
+    return joined
+
+
+def cut_at(
+    points: NDArray[np.float64], storeys: NDArray[np.int32], places: Sequence[float]
+) -> list[tuple[NDArray[np.float64], NDArray[np.int32]]]:
+    """Cut a line at metres along it; pieces without length fall away.
+
+    Returns
+    -------
+    pieces
+        Points and storeys, in order; each begins where the one before ended.
+    """
+    reached = np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
+    total = float(reached[-1])
+    inner = sorted({place for place in places if _JOIN < place < total - _JOIN})
+    pieces = []
+    for begin, end in zip([0.0, *inner], [*inner, total], strict=True):
+        first = int(np.searchsorted(reached, begin, side="right"))
+        last = int(np.searchsorted(reached, end, side="left"))
+        middle = slice(first, last)
+        ends = [_point_at(points, reached, begin), _point_at(points, reached, end)]
+        on = [storeys[max(first - 1, 0)], storeys[last] if end == total or last == first else storeys[last - 1]]
+        pieces.append(
+            (
+                np.vstack([ends[0], points[middle], ends[1]]),
+                np.concatenate([on[:1], storeys[middle], on[1:]]).astype(np.int32),
+            )
+        )
+    return pieces
+
+
+def _point_at(points: NDArray[np.float64], reached: NDArray[np.float64], place: float) -> NDArray[np.float64]:
+    ends: NDArray[np.float64] = points[0] if place <= 0 else points[-1]
+    if not 0 < place < reached[-1]:
+        return ends
+    k = int(np.searchsorted(reached, place, side="right")) - 1
+    share = (place - reached[k]) / (reached[k + 1] - reached[k])
+    point: NDArray[np.float64] = points[k] + share * (points[k + 1] - points[k])
+    return point

@@ -1,0 +1,293 @@
+"""How a robot drives along a line: speed, acceleration, turning, and where that puts it at every moment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bimnav.robot import Robot
+
+__all__ = ["Motion", "drive", "rest", "stand"]
+
+_SAME_POINT = 1e-9  # metres
+_STRAIGHT = 1e-6  # radians; a smaller change of direction is rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """A stretch of driving from rest to rest, or of standing.
+
+    Row k holds from `times[k]` until `times[k + 1]`; the columns are those of a `Track`.
+
+    Parameters
+    ----------
+    times : (n,) float64, seconds since it began
+    points : (n, 3) float64, world points in metres
+    storeys : (n,) int32, indexes of storeys
+    eases, turns : (n,) float64
+        As in a track.
+    length
+        Metres driven.
+    """
+
+    times: NDArray[np.float64]
+    points: NDArray[np.float64]
+    storeys: NDArray[np.int32]
+    eases: NDArray[np.float64]
+    turns: NDArray[np.float64]
+    length: float
+
+    @property
+    def duration(self) -> float:
+        """Seconds from begin to end."""
+        return float(self.times[-1])
+
+    def row_at(self, seconds: float) -> int:
+        """Return the row that holds some seconds after the begin."""
+        return max(int(np.searchsorted(self.times, seconds, side="right")) - 1, 0)
+
+    def point_at(self, seconds: float) -> NDArray[np.float64]:
+        """Return where the robot is some seconds after the begin, (3,) metres."""
+        return self._inside(seconds)[1]
+
+    def _inside(self, seconds: float) -> tuple[int, NDArray[np.float64], float]:
+        """Return row, point and speed at a time."""
+        row = self.row_at(seconds)
+        if row >= len(self.times) - 1:
+            return row, self.points[-1], 0.0
+        span = float(self.times[row + 1] - self.times[row])
+        share = (seconds - float(self.times[row])) / span
+        ease = float(self.eases[row])
+        way = self.points[row + 1] - self.points[row]
+        mean = math.sqrt(float(way @ way)) / span
+        point: NDArray[np.float64] = self.points[row] + share * (ease + (1 - ease) * share) * way
+        return row, point, mean * (ease + 2 * (1 - ease) * share)
+
+    def halted(self, seconds: float, acceleration: float) -> Motion:
+        """Return the motion of a robot that begins to brake after some seconds, if it still moves."""
+        if seconds >= self.duration:
+            return self
+        row, point, speed = self._inside(seconds)
+        turned = float(self.turns[row])
+        if turned:
+            turned *= (seconds - float(self.times[row])) / float(self.times[row + 1] - self.times[row])
+        head = (self.times[: row + 1], self.points[: row + 1], self.storeys[: row + 1], self.eases[: row + 1])
+        before = float(self.times[row])
+        eases = head[3].copy()
+        if seconds > before:
+            way = self.points[row + 1] - self.points[row]
+            mean = math.sqrt(float((point - self.points[row]) @ (point - self.points[row]))) / (seconds - before)
+            first = float(eases[row]) * math.sqrt(float(way @ way)) / float(self.times[row + 1] - before)
+            eases[row] = first / mean if mean > 0 else 1.0
+        tail = _braking(np.vstack([point, self.points[row + 1 :]]), speed, acceleration)
+        times = np.concatenate([head[0], seconds + tail[0]])
+        points = np.concatenate([head[1], tail[1]])
+        turns = np.concatenate([self.turns[:row], [turned], np.zeros(len(tail[0]))])
+        storeys = np.concatenate([head[2], np.full(len(tail[0]), self.storeys[row], dtype=np.int32)])
+        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        return Motion(times, points, storeys, np.concatenate([eases, tail[2]]), turns, length)
+
+
+def _braking(
+    points: NDArray[np.float64], speed: float, acceleration: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return times, points and eases of a robot that brakes along a line until it stands."""
+    distance = speed * speed / (2 * acceleration) if math.isfinite(acceleration) else 0.0
+    if distance <= _SAME_POINT:
+        return np.zeros(1), points[:1], np.ones(1)
+    nodes, speeds, driven = [points[0]], [speed], 0.0
+    for a, b in pairwise(points):
+        length = float(np.linalg.norm(b - a))
+        if length <= _SAME_POINT:
+            continue
+        left = distance - driven
+        if length >= left:
+            nodes.append(a + left / length * (b - a))
+            speeds.append(0.0)
+            break
+        driven += length
+        nodes.append(b)
+        speeds.append(math.sqrt(max(speed * speed - 2 * acceleration * driven, 0.0)))
+    speeds[-1] = 0.0
+    return _timed(nodes, speeds)
+
+
+def _timed(
+    nodes: Sequence[NDArray[np.float64]], speeds: Sequence[float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return times, points and eases of a line whose pieces are driven with constant acceleration."""
+    spans, eases = [0.0], []
+    for (a, b), (before, after) in zip(pairwise(nodes), pairwise(speeds), strict=True):
+        spans.append(2 * float(np.linalg.norm(b - a)) / (before + after))
+        eases.append(2 * before / (before + after))
+    return np.fromiter(accumulate(spans), np.float64), np.array(nodes), np.array([*eases, 1.0])
+
+
+def stand(point: ArrayLike, storey: int, turn: float = 0.0, seconds: float = 0.0) -> Motion:
+    """Return a motion that goes nowhere, and may turn on the spot meanwhile.
+
+    Parameters
+    ----------
+    point : (3,) metres
+    storey
+        Index of the storey.
+    turn
+        Radians counter-clockwise.
+    seconds
+        How long the turn takes.
+    """
+    n = 2 if turn else 1
+    turns = np.array([turn, 0.0][:n])
+    return Motion(
+        np.array([0.0, seconds][:n]),
+        np.tile(np.asarray(point, np.float64), (n, 1)),
+        np.full(n, storey, dtype=np.int32),
+        np.ones(n),
+        turns,
+        0.0,
+    )
+
+
+def rest(points: NDArray[np.float64], storeys: NDArray[np.int32], seconds: float) -> Motion:
+    """Return the motion of something that is carried along a line in given seconds, as by a lift."""
+    reached = np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
+    times = reached / reached[-1] * seconds if reached[-1] > 0 else np.linspace(0.0, seconds, len(points))
+    return Motion(times, points, storeys, np.ones(len(points)), np.zeros(len(points)), float(reached[-1]))
+
+
+def drive(
+    points: NDArray[np.float64],
+    storeys: NDArray[np.int32],
+    robot: Robot,
+    *,
+    speed: float | None = None,
+    heading: float | None = None,
+    limits: Sequence[float] | None = None,
+) -> Motion:
+    """Plan how a robot drives along a line, from rest to rest.
+
+    The speed rises and falls with constant acceleration, so that it is a trapezoid over time on a straight
+    line, and never above a limit. A robot with a turn rate halts wherever the line turns, and turns on the
+    spot; one without rounds corners at speed.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, metres
+    storeys : (n,) int32
+    robot
+        Gives speed, acceleration and turn rate.
+    speed
+        Cruising speed instead of the robot's, metres per second.
+    heading
+        Which way the robot faces before, radians; None if it already faces the right way.
+    limits : (n - 1,) metres per second
+        Highest speed on every piece of the line; None for no limit.
+    """
+    speed = robot.speed if speed is None else speed
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if math.isinf(robot.acceleration) and math.isinf(robot.turn_rate) and limits is None:
+        reached = np.append(0.0, steps.cumsum())
+        n = len(points)
+        return Motion(reached / speed, points, storeys, np.ones(n), np.zeros(n), float(reached[-1]))
+    kept = np.append(True, steps > _SAME_POINT)
+    line, on, lengths = points[kept], storeys[kept], steps[kept[1:]]
+    if len(line) == 1:
+        return stand(line[0], int(on[0]))
+    tops = np.full(len(lengths), speed) if limits is None else np.minimum(speed, np.asarray(limits)[kept[1:]])
+    turns = _turns(line, heading) if math.isfinite(robot.turn_rate) else np.zeros(len(lengths))
+    return _driven(line, on, lengths, tops, turns, robot)
+
+
+def _turns(line: NDArray[np.float64], heading: float | None) -> NDArray[np.float64]:
+    """Return how far to turn before every piece of a line, radians; a piece that only rises turns nothing."""
+    turns = np.zeros(len(line) - 1)
+    facing = heading
+    for k, (dx, dy) in enumerate(np.diff(line[:, :2], axis=0).tolist()):
+        if math.hypot(dx, dy) <= _SAME_POINT:
+            continue
+        ahead = math.atan2(dy, dx)
+        turn = 0.0 if facing is None else math.remainder(ahead - facing, 2 * math.pi)
+        turns[k] = turn if abs(turn) > _STRAIGHT else 0.0
+        facing = ahead
+    return turns
+
+
+def _driven(
+    line: NDArray[np.float64],
+    on: NDArray[np.int32],
+    lengths: NDArray[np.float64],
+    tops: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    robot: Robot,
+) -> Motion:
+    """Put the pieces of a line together: turns, and the three phases of every piece."""
+    speeds = _speeds_at(lengths, tops, turns, robot.acceleration)
+    times, points, storeys, eases, turned = [0.0], [line[0]], [int(on[0])], [1.0], [0.0]
+
+    def go(point: NDArray[np.float64], storey: int, span: float, ease: float, turn: float = 0.0) -> None:
+        eases[-1], turned[-1] = ease, turn
+        times.append(times[-1] + span)
+        points.append(point)
+        storeys.append(storey)
+        eases.append(1.0)
+        turned.append(0.0)
+
+    for k, (a, b) in enumerate(pairwise(line)):
+        if turns[k]:
+            go(a, int(on[k]), abs(float(turns[k])) / robot.turn_rate, 1.0, float(turns[k]))
+        for share, span, ease in _phases(
+            float(lengths[k]), speeds[k], float(tops[k]), speeds[k + 1], robot.acceleration
+        ):
+            last = share >= 1
+            go(b if last else a + share * (b - a), int(on[k + 1]) if last else int(on[k]), span, ease)
+    return Motion(
+        np.array(times),
+        np.array(points),
+        np.array(storeys, dtype=np.int32),
+        np.array(eases),
+        np.array(turned),
+        float(lengths.sum()),
+    )
+
+
+def _speeds_at(
+    lengths: NDArray[np.float64], tops: NDArray[np.float64], turns: NDArray[np.float64], acceleration: float
+) -> list[float]:
+    """Return the speed at every point: what limits, turns, starting and braking allow."""
+    n = len(lengths)
+    speeds = [0.0, *np.minimum(tops[:-1], tops[1:]).tolist(), 0.0]
+    for k in range(1, n):
+        if turns[k]:
+            speeds[k] = 0.0
+    if math.isinf(acceleration):
+        return speeds
+    for k in range(n):
+        speeds[k + 1] = min(speeds[k + 1], math.sqrt(speeds[k] ** 2 + 2 * acceleration * float(lengths[k])))
+    for k in reversed(range(n)):
+        speeds[k] = min(speeds[k], math.sqrt(speeds[k + 1] ** 2 + 2 * acceleration * float(lengths[k])))
+    return speeds
+
+
+def _phases(
+    length: float, before: float, top: float, after: float, acceleration: float
+) -> list[tuple[float, float, float]]:
+    """Return the phases of a piece: share of it done at their end, seconds, and ease."""
+    if math.isinf(acceleration):
+        return [(1.0, length / top, 1.0)]
+    peak = min(top, math.sqrt(acceleration * length + (before * before + after * after) / 2))
+    faster = (peak * peak - before * before) / (2 * acceleration)
+    slower = (peak * peak - after * after) / (2 * acceleration)
+    cruise = length - faster - slower
+    phases, done = [], 0.0
+    for way, begin, end in ((faster, before, peak), (cruise, peak, peak), (slower, peak, after)):
+        if way > _SAME_POINT * length:
+            done += way
+            phases.append((done / length, 2 * way / (begin + end), 2 * begin / (begin + end)))
+    share, span, ease = phases[-1]
+    phases[-1] = (max(share, 1.0), span, ease)
+    return phases

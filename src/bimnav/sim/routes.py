@@ -1,0 +1,147 @@
+"""Lines that robots drive: the legs of a tour, and ways found while the simulation runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bimnav.errors import SimulationError
+from bimnav.grid import Cell, GridFrame
+from bimnav.plan import find_path
+
+if TYPE_CHECKING:
+    from bimnav.graph import NavGraph
+    from bimnav.plan import Tour
+
+__all__ = ["JOINED", "Line", "cell_near", "legs_of", "way_between"]
+
+JOINED = 1e-6  # metres between the end of one leg and the start of the next
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A line to drive.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, metres
+    storeys : (n,) int32, indexes of storeys
+    """
+
+    points: NDArray[np.float64]
+    storeys: NDArray[np.int32]
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+def legs_of(tour: Tour) -> list[Line]:
+    """Return the route as lines that begin where the last one ended and end where the stop says.
+
+    Raises
+    ------
+    SimulationError
+        If they do not.
+    """
+    ends = [stop.end for stop in tour.stops]
+    storeys = [stop.cell.storey for stop in tour.stops]
+    if tour.return_to_start and len(tour.route) > len(ends):
+        ends.append(tour.start_point)
+        storeys.append(tour.start.storey)
+    if len(tour.route) != len(ends):
+        raise SimulationError(f"a tour of {len(tour.stops)} stops has {len(tour.route)} legs.")
+    legs, here, before = [], tour.start_point, tour.start.storey
+    for k, (polyline, end, after) in enumerate(zip(tour.route, ends, storeys, strict=True)):
+        leg = np.asarray(polyline, dtype=np.float64)
+        if leg.ndim != 2 or leg.shape[1] != 3 or not len(leg) or not np.isfinite(leg).all():
+            raise SimulationError(f"leg {k} of the tour is no polyline of finite points.", "", {"leg": k})
+        gaps = math.dist(here, leg[0]), math.dist(leg[-1], end)
+        if max(gaps) > JOINED:
+            raise SimulationError(
+                f"leg {k} of the tour begins {gaps[0]:.6g} m from where the robot is "
+                f"and ends {gaps[1]:.6g} m from where it should stop.",
+                "A route is one unbroken line through the ends of its stops.",
+                {"leg": k},
+            )
+        legs.append(Line(leg, _storeys_along(leg, tour.graph.frame, before, after)))
+        here, before = end, after
+    return legs
+
+
+def _storeys_along(leg: NDArray[np.float64], frame: GridFrame, before: int, after: int) -> NDArray[np.int32]:
+    """Return the storey of every point: the one it comes from or goes to at their heights, else the one below."""
+    height = leg[:, 2]
+    if before == after and (np.abs(height - frame.elevations[before]) <= JOINED).all():
+        return np.full(len(leg), before, dtype=np.int32)
+    heights, index = np.unique(height, return_inverse=True)
+    storeys = np.array([frame.storey_at(z) for z in heights.tolist()], dtype=np.int32)
+    for storey in (after, before):
+        storeys[np.abs(heights - frame.elevations[storey]) <= JOINED] = storey
+    return storeys[index]
+
+
+def cell_near(graph: NavGraph, point: tuple[float, float, float], storey: int) -> Cell | None:
+    """Return a free cell whose middle a robot reaches straight from a point: its own, else the nearest around."""
+    own = graph.frame.cell_at(point[0], point[1], storey=storey)
+    around = [Cell(storey, own.row + i, own.col + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    free = [cell for cell in around if cell in graph.frame and graph.free[cell]]
+    if own in free:
+        return own
+    environment = graph.environment
+    for cell in sorted(free, key=lambda cell: (math.dist(graph.frame.center_of(cell)[:2], point[:2]), cell)):
+        if environment is None or environment.is_clear(storey, point, graph.frame.center_of(cell)):
+            return cell
+    return None
+
+
+def way_between(
+    graph: NavGraph,
+    point: tuple[float, float, float],
+    begin: Cell,
+    goal: Cell,
+    end: tuple[float, float, float],
+    *,
+    straight_in: bool = False,
+) -> Line:
+    """Find a way from an exact point in or beside a cell to an exact point in another.
+
+    Parameters
+    ----------
+    straight_in
+        Whether the goal's own middle is left out, because the cell is blocked.
+
+    Raises
+    ------
+    NoPathError
+        If there is none.
+    """
+    path = find_path(graph, begin, goal)
+    cells, middles = path.indices, path.points
+    if straight_in and len(cells) > 1:
+        cells, middles = cells[:-1], middles[:-1]
+    if len(cells) > 2:
+        steps = np.column_stack([np.diff(middles, axis=0), np.diff(cells[:, 0])])
+        turns = (np.abs(np.diff(steps, axis=0)) > JOINED).any(axis=1)
+        kept = np.concatenate([[True], turns, [True]])
+        cells, middles = cells[kept], middles[kept]
+    points = np.vstack([point, middles, end])
+    storeys = np.concatenate([cells[:1, 0], cells[:, 0], cells[-1:, 0]]).astype(np.int32)
+    if begin == goal and math.dist(point, end) <= graph.frame.cell_size * 1.5 and _sees(graph, begin, point, end):
+        points, storeys = points[[0, -1]], storeys[[0, -1]]
+    moved = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > JOINED)
+    moved[-1] = True
+    return Line(points[moved], storeys[moved])
+
+
+def _sees(graph: NavGraph, cell: Cell, *points: tuple[float, float, float]) -> bool:
+    """Tell whether points lie in one cell, so that a straight line between them stays in it."""
+    x0, y0, x1, y1 = graph.frame.box_of(cell)
+    box = shapely.box(x0 - JOINED, y0 - JOINED, x1 + JOINED, y1 + JOINED)
+    return all(box.covers(shapely.Point(point[:2])) for point in points)

@@ -1,0 +1,156 @@
+"""A way cut into stretches: what a robot must have before it enters each, and how fast it may be there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bimnav.sim.areas import Crossing, Passage, SpeedLimit, crossings, cut_at
+from bimnav.sim.doors import SimDoor
+from bimnav.sim.lifts import Lift
+from bimnav.sim.routes import JOINED, Line
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+__all__ = ["Stretch", "cut"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """A part of a way that is driven, or ridden, from rest to rest.
+
+    Parameters
+    ----------
+    points, storeys
+        As in a line.
+    needs
+        Names of the resources that are held on it.
+    doors
+        Those among them that are doors.
+    lift
+        Name of the lift that carries the robot; None if it drives.
+    limits : (n - 1,) metres per second
+        Highest speed on every piece; None for no limit.
+    area
+        Floor of the resources, metres.
+    storey
+        Of that floor.
+    """
+
+    points: NDArray[np.float64]
+    storeys: NDArray[np.int32]
+    needs: frozenset[str] = frozenset()
+    doors: tuple[SimDoor, ...] = ()
+    lift: str | None = None
+    limits: tuple[float, ...] | None = None
+    area: BaseGeometry | None = None
+    storey: int = 0
+
+
+def cut(
+    line: Line,
+    doors: Sequence[SimDoor],
+    passages: Sequence[Passage],
+    lifts: Sequence[Lift],
+    limits: Sequence[SpeedLimit],
+) -> list[Stretch]:
+    """Cut a line where it enters and leaves doorways, passages and lifts.
+
+    Resources whose floor overlaps along the way are needed together, from where the first begins to where
+    the last ends, so that nobody waits for one while standing in another.
+    """
+    if not (doors or passages or lifts or limits):
+        return [Stretch(line.points, line.storeys)]
+    shared: list[SimDoor | Passage] = [*doors, *passages]
+    found = crossings(line.points, line.storeys, [(_polygon(area), area.storey) for area in shared])
+    sections = _sections(found)
+    rides = _rides(line, lifts)
+    places = [place for begin, end, *_ in (*sections, *rides) for place in (begin, end)]
+    stretches, done = [], 0.0
+    for points, storeys in cut_at(line.points, line.storeys, places):
+        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        middle = done + length / 2
+        done += length
+        lift = next((lift for begin, end, lift in rides if begin <= middle <= end), None)
+        used = next((used for begin, end, used in sections if begin <= middle <= end), ())
+        areas = [shared[k] for k in sorted(used)]
+        capped = (points, storeys, None) if lift or not limits else _limited(points, storeys, limits)
+        stretches.append(
+            Stretch(
+                *capped[:2],
+                frozenset(name_of(area) for area in areas),
+                tuple(area for area in areas if isinstance(area, SimDoor)),
+                lift,
+                capped[2],
+                shapely.union_all([_polygon(area) for area in areas]) if areas else None,
+                areas[0].storey if areas else 0,
+            )
+        )
+    return stretches
+
+
+def name_of(area: SimDoor | Passage) -> str:
+    """Return the name by which a resource is claimed."""
+    return area.global_id if isinstance(area, SimDoor) else area.name
+
+
+def _polygon(area: SimDoor | Passage) -> BaseGeometry:
+    return shapely.Polygon() if area.polygon is None else area.polygon
+
+
+def _sections(found: Sequence[Crossing]) -> list[tuple[float, float, set[int]]]:
+    """Join crossings that overlap along the way."""
+    sections: list[tuple[float, float, set[int]]] = []
+    for crossing in found:
+        if sections and crossing.begin <= sections[-1][1] + JOINED:
+            begin, end, used = sections[-1]
+            sections[-1] = (begin, max(end, crossing.end), used | {crossing.area})
+        else:
+            sections.append((crossing.begin, crossing.end, {crossing.area}))
+    return sections
+
+
+def _rides(line: Line, lifts: Sequence[Lift]) -> list[tuple[float, float, str]]:
+    """Return begin, end and lift of the parts of a line that rise more steeply than they go forward."""
+    steps = np.diff(line.points, axis=0)
+    run, rise = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
+    reached = np.append(0.0, np.linalg.norm(steps, axis=1).cumsum())
+    rides: list[tuple[float, float, str]] = []
+    for k in np.flatnonzero((rise > run) & (rise > JOINED)).tolist():
+        x, y, _ = line.points[k].tolist()
+        lift = next((lift for lift in lifts if (lift.x - x) ** 2 + (lift.y - y) ** 2 <= lift.reach**2), None)
+        if lift is None:
+            continue
+        begin, end = float(reached[k]), float(reached[k + 1])
+        if rides and rides[-1][2] == lift.name and begin - rides[-1][1] <= JOINED:
+            rides[-1] = (rides[-1][0], end, lift.name)
+        else:
+            rides.append((begin, end, lift.name))
+    return rides
+
+
+def _limited(
+    points: NDArray[np.float64], storeys: NDArray[np.int32], limits: Sequence[SpeedLimit]
+) -> tuple[NDArray[np.float64], NDArray[np.int32], tuple[float, ...] | None]:
+    """Put points where speed limits begin and end; return the limit of every piece, too."""
+    slow = crossings(points, storeys, [(limit.polygon, limit.storey) for limit in limits])
+    if not slow:
+        return points, storeys, None
+    pieces = cut_at(points, storeys, [place for crossing in slow for place in (crossing.begin, crossing.end)])
+    speeds: list[float] = []
+    done = 0.0
+    for part, _ in pieces:
+        length = float(np.linalg.norm(np.diff(part, axis=0), axis=1).sum())
+        middle = done + length / 2
+        done += length
+        here = [limits[crossing.area].speed for crossing in slow if crossing.begin <= middle <= crossing.end]
+        speeds += [min(here, default=np.inf)] * (len(part) - 1)
+    line = np.concatenate([pieces[0][0], *(part[1:] for part, _ in pieces[1:])])
+    on = np.concatenate([pieces[0][1], *(floor[1:] for _, floor in pieces[1:])])
+    return line, on, tuple(speeds)
