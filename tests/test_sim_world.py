@@ -276,7 +276,7 @@ def test_a_robot_charges_before_what_it_could_not_do_and_get_back_from():
     # after 40 m and 25 s of work 110 J are left; 5 m, 25 s and the way back from 45 m take 5 + 50 + 45 * 1.25 J and 5 %
     (charge,) = rows(result, "charge")
     assert charge.time == 40 + 25 + 40
-    assert charge.cause == "charger dock; 55% were left, 40.00 m"
+    assert charge.cause == "charger dock; 35% are left, 40.00 m to get there"
     (charged,) = rows(result, "charged")
     assert charged.time == pytest.approx(105 + (200 - 110 + 40) / 10)
     assert charged.battery == pytest.approx(1.0)

@@ -19,7 +19,7 @@ from bimnav.sim.energy import Battery
 from bimnav.sim.knowledge import Closure
 from bimnav.sim.log import Event, EventKind
 from bimnav.sim.motion import Motion, drive, rest, stand
-from bimnav.sim.routes import JOINED, Line, legs_of
+from bimnav.sim.routes import JOINED, Line, end_of, legs_of
 from bimnav.sim.track import RobotStatus, TrackRecorder
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ Step: TypeAlias = Generator[simpy.Event, Any, bool]
 _RESERVE = 0.1  # of a full battery; a robot that would have less left on arrival at a charger charges first
 _GLANCE = 1.0  # seconds after which a robot that makes way looks again
 _AHEAD = 1.0  # seconds of free way ahead with which it goes on
+_PROGRESS = 1.0  # metres driven in one go, after which a robot is no longer held up by the same thing
 _RETRY = 10.0  # seconds after which a robot whose way is closed looks for another
 
 
@@ -113,9 +114,13 @@ class RobotAgent:
         legs = legs_of(tour)
         for k, stop in enumerate(tour.stops):
             self.agenda.append(Errand(stop, stop.cell, stop.end, k, legs[k]))
-        if tour.return_to_start and len(legs) > len(tour.stops):
-            end = tuple(map(float, tour.start_point))
-            self.home = Errand(None, tour.start, end, -1, legs[-1], "return to the start")  # type: ignore[arg-type]
+        if len(legs) > len(tour.stops):
+            self.home = self.homeward(legs[-1])
+
+    def homeward(self, leg: Line | None = None) -> Errand:
+        """Return the way to where the tour ends behind its last stop."""
+        purpose = "return to the start" if self.tour.return_to_start else "to the end of the tour"
+        return Errand(None, *end_of(self.tour), -1, leg, purpose)
 
     # --- writing down
 
@@ -224,6 +229,8 @@ class RobotAgent:
             elif (yield from self.go(errand)):
                 if errand.stop is None:
                     self.home = None
+                elif errand.stop.kind == "charger":
+                    yield from self.recharge(errand)
                 else:
                     yield from self.serve(errand)
 
@@ -350,7 +357,7 @@ class RobotAgent:
 
     def turn_to(self, errand: Errand) -> None:
         """Face the way a stop asks for; a robot without a turn rate does so at once."""
-        wanted = getattr(errand.stop, "heading", None)
+        wanted = None if errand.stop is None else errand.stop.heading
         if wanted is None or not self.world.keeps_history:
             return
         pieces = self.recorder.pieces
@@ -473,11 +480,12 @@ class RobotAgent:
         self.under_way = None
         if self.world.keeps_history:
             self.recorder.add(begin, motion, self.status, errand.index)
-        if motion.length > JOINED:
+        if motion.length > _PROGRESS:
             self.stuck_since = None
         self.distance += motion.length
         self.leg_distance += motion.length
-        self.charge_distance += motion.length if errand.purpose == "charge" else 0.0
+        if errand.purpose == "charge" or (errand.stop is not None and errand.stop.kind == "charger"):
+            self.charge_distance += motion.length
         x, y, z = motion.points[-1].tolist()
         self.place, self.storey = (x, y, z), int(motion.storeys[-1])
         if math.isfinite(self.robot.turn_rate):
@@ -570,7 +578,7 @@ class RobotAgent:
         self.avoided = None
         self.become(RobotStatus.IDLE)
         self.note("give_up", errand.stop, cause)
-        if errand.stop is not None:
+        if errand.stop is not None and errand.stop.kind == "target":
             self.world.given_up.append(errand.stop.global_id)
 
     # --- the battery
@@ -596,7 +604,7 @@ class RobotAgent:
 
     def charge(self, errand: Errand) -> Process:
         """Go to a charger, wait for it if it is in use, and fill the battery."""
-        name, share = errand.charger, self.battery.share
+        name = errand.charger
         granted = self.world.claims.request([name])
         if granted is not None:
             self.halt(RobotStatus.WAITING, "wait", errand, f"{self.world.label_of(name)} is in use")
@@ -607,14 +615,36 @@ class RobotAgent:
             self.become(RobotStatus.IDLE)
             self.run_down()
         if (yield from self.go(errand)):
-            seconds = self.battery.seconds_to_full()
-            self.become(RobotStatus.CHARGING)
-            self.note("charge", None, f"{self.world.label_of(name)}; {share:.0%} were left, {self.leg_distance:.2f} m")
-            self.record()
-            yield from self.pause(self.world.pass_time(seconds))
-            self.become(RobotStatus.IDLE)
-            self.note("charged", None, f"{seconds:.0f} s")
+            yield from self.fill(name, None)
         self.world.claims.release([name])
+
+    def recharge(self, errand: Errand) -> Process:
+        """Fill the battery at a charger that the tour visits."""
+        stop = errand.stop
+        assert stop is not None  # noqa: S101 - a visit is a stop
+        granted = self.world.claims.request([stop.global_id])
+        if granted is not None:
+            self.halt(RobotStatus.WAITING, "wait", errand, f"{self.world.label_of(stop.global_id)} is in use")
+            if (yield from self.pause(granted)):
+                self.world.claims.withdraw(granted)
+                return
+        yield from self.fill(stop.global_id, stop)
+        self.world.claims.release([stop.global_id])
+        if not self.orders:
+            self.agenda.remove(errand)
+
+    def fill(self, name: str, stop: Stop | None) -> Process:
+        """Charge until the battery is full, or something is ordered."""
+        self.settle()
+        seconds, share = self.battery.seconds_to_full(), self.battery.share or 0.0
+        self.become(RobotStatus.CHARGING)
+        self.note(
+            "charge", stop, f"{self.world.label_of(name)}; {share:.0%} are left, {self.leg_distance:.2f} m to get there"
+        )
+        self.record()
+        yield from self.pause(self.world.pass_time(seconds))
+        self.become(RobotStatus.IDLE)
+        self.note("charged", stop, f"{seconds:.0f} s")
 
     # --- trouble
 

@@ -140,6 +140,11 @@ def _descend(graph: NavGraph, distance: NDArray[np.float64], cell: Cell, needed:
     while not needed[cell]:
         needed[cell] = True
         near = [Cell(cell.storey, cell.row + i, cell.col + j) for i, j in around]
+        near += [
+            link.end if link.begin == cell else link.begin
+            for link in graph.connectors
+            if cell in (link.begin, link.end)
+        ]
         near = [other for other in near if other in graph.frame and distance[other] < distance[cell]]
         if not near:
             return

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import simpy
 
+from bimnav._approach import stop_for
 from bimnav.environment import Target
 from bimnav.errors import BimnavError, ModelError, ValueRangeError
 from bimnav.sim.agents import Order
@@ -25,7 +26,7 @@ from bimnav.sim.changes import (
 from bimnav.sim.doors import DoorState, SimDoor
 from bimnav.sim.knowledge import Closure
 from bimnav.sim.track import RobotStatus
-from bimnav.stops import Stop, Unreached, standing_at, stop_at
+from bimnav.stops import Stop, Unreached
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -142,8 +143,8 @@ def _stop_for(change: TargetReported, global_id: str, world: World) -> tuple[Sto
         return None, error.message
     point = (change.x, change.y, graph.frame.elevations[change.storey])
     target = Target(global_id, change.name, change.storey, point, None, "user", "reported")
-    stop = stop_at(graph, target, cell) or standing_at(graph, target, None)
-    return stop, "" if stop is not None else "its cell is blocked, and no place to stand is near"
+    found = stop_for(graph, target, cell, None)
+    return (found, "") if isinstance(found, Stop) else (None, found.reason)
 
 
 @_happen.register(RobotFails)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from bimnav.environment import grown
 from bimnav.graph import NavGraph
-from bimnav.grid import rasterize
+from bimnav.grid import Cell, rasterize
 from bimnav.robot import Robot
 from bimnav.sim.areas import crossings
 
@@ -129,8 +128,10 @@ class Knowledge:
             return graph
         key = (id(graph), tuple(id(closure) for closure in active))
         if key not in self._graphs:
-            cost = graph.cost.copy()
-            for closure in active:
-                cost[closure.storey][rasterize(graph.frame, closure.body(robot))] = math.inf
-            self._graphs[key] = replace(graph, cost=cost)
+            closed = [
+                Cell(closure.storey, row, col)
+                for closure in active
+                for row, col in np.argwhere(rasterize(graph.frame, closure.body(robot))).tolist()
+            ]
+            self._graphs[key] = graph.block(closed)
         return self._graphs[key]

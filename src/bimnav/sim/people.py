@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -107,10 +108,10 @@ class Walker:
                 self._walk(ways[self.points[-1] == self.person.route[-1]][1:])
             else:
                 self._wander()
-        times = np.array(self.times)
-        first = max(int(np.searchsorted(times, begin, side="right")) - 1, 0)
-        last = int(np.searchsorted(times, end, side="left")) + 1
-        return times[first:last], np.array(self.points[first:last])
+        first = max(bisect_right(self.times, begin) - 1, 0)
+        last = bisect_left(self.times, end) + 1
+        first = min(first, len(self.times) - 1)
+        return np.array(self.times[first:last]), np.array(self.points[first:last])
 
     def way(self, begin: float, end: float) -> NDArray[np.float64]:
         """Return the line (n, 2) they walk between two times, as far as they are there."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bimnav.graph import NavGraph
     from bimnav.plan import Tour
 
-__all__ = ["JOINED", "Line", "cell_near", "legs_of", "way_between"]
+__all__ = ["JOINED", "Line", "cell_near", "end_of", "legs_of", "way_between"]
 
 JOINED = 1e-6  # metres between the end of one leg and the start of the next
 
@@ -52,9 +52,9 @@ def legs_of(tour: Tour) -> list[Line]:
     """
     ends = [stop.end for stop in tour.stops]
     storeys = [stop.cell.storey for stop in tour.stops]
-    if tour.return_to_start and len(tour.route) > len(ends):
-        ends.append(tour.start_point)
-        storeys.append(tour.start.storey)
+    if len(tour.route) > len(ends):
+        ends.append(end_of(tour)[1])
+        storeys.append(end_of(tour)[0].storey)
     if len(tour.route) != len(ends):
         raise SimulationError(f"a tour of {len(tour.stops)} stops has {len(tour.route)} legs.")
     legs, here, before = [], tour.start_point, tour.start.storey
@@ -73,6 +73,12 @@ def legs_of(tour: Tour) -> list[Line]:
         legs.append(Line(leg, _storeys_along(leg, tour.graph.frame, before, after)))
         here, before = end, after
     return legs
+
+
+def end_of(tour: Tour) -> tuple[Cell, tuple[float, float, float]]:
+    """Return the cell and the world point to which a tour leads behind its last stop."""
+    end = getattr(tour, "end", None)
+    return (tour.start, tour.start_point) if end is None else (end, tour.graph.frame.center_of(end))
 
 
 def _storeys_along(leg: NDArray[np.float64], frame: GridFrame, before: int, after: int) -> NDArray[np.int32]:
@@ -123,16 +129,11 @@ def way_between(
         If there is none.
     """
     path = find_path(graph, begin, goal)
-    cells, middles = path.indices, path.points
-    if straight_in and len(cells) > 1:
-        cells, middles = cells[:-1], middles[:-1]
-    if len(cells) > 2:
-        steps = np.column_stack([np.diff(middles, axis=0), np.diff(cells[:, 0])])
-        turns = (np.abs(np.diff(steps, axis=0)) > JOINED).any(axis=1)
-        kept = np.concatenate([[True], turns, [True]])
-        cells, middles = cells[kept], middles[kept]
+    middles = path.waypoints
+    if straight_in and len(path.indices) > 1:
+        middles = np.vstack([middles[:-1], graph.frame.centers_of(path.indices[-2])])
     points = np.vstack([point, middles, end])
-    storeys = np.concatenate([cells[:1, 0], cells[:, 0], cells[-1:, 0]]).astype(np.int32)
+    storeys = _storeys_along(points, graph.frame, begin.storey, goal.storey)
     if begin == goal and math.dist(point, end) <= graph.frame.cell_size * 1.5 and _sees(graph, begin, point, end):
         points, storeys = points[[0, -1]], storeys[[0, -1]]
     moved = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > JOINED)

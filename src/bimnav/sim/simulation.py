@@ -5,33 +5,35 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 import simpy
 
-from bimnav.building import Element, Space
 from bimnav.errors import InputError, ValueRangeError
+from bimnav.plan.tours import find_chargers
 from bimnav.robot import Robot
 from bimnav.sim.agents import Order, RobotAgent
 from bimnav.sim.areas import Passage, SpeedLimit
 from bimnav.sim.changes import Change, Sensing
-from bimnav.sim.doors import SimDoor, doors_in
+from bimnav.sim.doors import DoorState, SimDoor, doors_in
 from bimnav.sim.happenings import doors_named, plan_changes
 from bimnav.sim.lifts import Lift
 from bimnav.sim.log import Event, EventLog
 from bimnav.sim.people import Person, Walker
 from bimnav.sim.result import SimResult, Tally
-from bimnav.sim.routes import cell_near
 from bimnav.sim.world import LATEST, Charger, Decision, Policy, ServiceTime, Setting, Speed, World
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from bimnav.environment import IndoorEnvironment
     from bimnav.graph import NavGraph
     from bimnav.plan import Tour
 
 __all__ = ["ServiceTime", "simulate"]
+
+_LIFT_SPEED = 1.0  # metres per second, as for links
 
 
 @runtime_checkable
@@ -52,7 +54,7 @@ def simulate(
     events: Iterable[Change] = (),
     people: Iterable[Person] = (),
     doors: Iterable[SimDoor] = (),
-    lifts: Iterable[Lift] = (),
+    lifts: Iterable[Lift] | None = None,
     chargers: Iterable[Charger] | None = None,
     passages: Iterable[Passage] = (),
     speed_limits: Iterable[SpeedLimit] = (),
@@ -89,7 +91,7 @@ def simulate(
     doors
         Doors that have to be opened, or are locked; other doors stand open.
     lifts
-        Lifts; without one, a robot drives what rises steeply, too.
+        Lifts; the default is those of the graph. Without any, a robot drives what rises steeply, too.
     chargers
         Where robots charge; the default is what the task names as docks.
     passages
@@ -144,7 +146,7 @@ def simulate(
     streams = _streams(rng or np.random.default_rng(0), len(tours), people)
     walkers = _walkers(people, tours[0].graph, streams[len(tours) :], begin)
     named = [SimDoor(global_id, "open") for global_id in doors_named(events)]
-    given = {door.global_id: door for door in (*named, *doors)}
+    given = {door.global_id: door for door in (*named, *_slow_doors(environment), *doors)}
     setting = Setting(
         service_time=_default_service(task) if service_time is None else service_time,
         speed=speed,
@@ -154,9 +156,9 @@ def simulate(
         start_times=starts,
         doors=doors_in(environment, given.values()),
         passages=tuple(passages),
-        lifts=tuple(lifts),
+        lifts=_lifts_in(tours[0].graph) if lifts is None else tuple(lifts),
         limits=tuple(speed_limits),
-        chargers=_docks_of(tours[0].graph, fleet) if chargers is None else tuple(chargers),
+        chargers=_chargers_in(tours, _docks_of(tours[0], fleet) if chargers is None else tuple(chargers)),
         walkers=walkers,
         is_eventful=bool(events or people or math.isfinite(until) or any(math.isfinite(r.battery_wh) for r in fleet)),
         keeps_history=history,
@@ -286,27 +288,46 @@ def _default_service(task: Any) -> ServiceTime | float:
     return seconds
 
 
-def _docks_of(graph: NavGraph, fleet: Sequence[Robot]) -> tuple[Charger, ...]:
-    """Return the chargers that the task names, for robots that tire."""
-    environment = graph.environment
-    if environment is None or not any(math.isfinite(robot.battery_wh) for robot in fleet):
-        return ()
-    from bimnav.tasks import match
+def _slow_doors(environment: IndoorEnvironment | None) -> list[SimDoor]:
+    """Return the doors for which robots wait, as the task says."""
+    known = () if environment is None else getattr(environment, "doors", ())
+    return [
+        SimDoor(door.global_id, cast(DoorState, door.state), door.opening_time) for door in known if door.opening_time
+    ]
 
-    found: dict[str, Element | Space] = {
-        p.global_id: p for rule in environment.task.docks for p, _ in match(rule, environment.building)
-    }
-    chargers = []
-    for product in found.values():
-        bounds = product.bounds
-        if bounds is None:
-            continue
-        x, y = ((bounds[0, :2] + bounds[1, :2]) / 2).tolist()
-        storey = graph.frame.storey_at(float(bounds[0, 2]))
-        cell = cell_near(graph, (x, y, graph.frame.elevations[storey]), storey)
-        if cell is not None:
-            chargers.append(Charger(product.global_id, cell, graph.frame.center_of(cell)))
-    return tuple(chargers)
+
+def _lifts_in(graph: NavGraph) -> tuple[Lift, ...]:
+    """Return the lifts of a graph, as fast as it reckons with; each waits on the lowest storey it serves."""
+    found: dict[str, Lift] = {}
+    for link in sorted(getattr(graph, "connectors", ()), key=lambda link: min(link.begin, link.end)):
+        if link.kind == "lift" and len(link.points) and (link.global_id or link.name) not in found:
+            rising = np.abs(np.diff(link.points[:, 2])).argmax()
+            x, y, _ = link.points[rising].tolist()
+            climb = abs(float(link.points[-1, 2] - link.points[0, 2]))
+            storeys = abs(link.end.storey - link.begin.storey)
+            stops = max((link.seconds or 0.0) - climb / _LIFT_SPEED, 0.0) / 2
+            found[link.global_id or link.name] = Lift(
+                link.global_id or link.name,
+                x,
+                y,
+                travel_time=climb / _LIFT_SPEED / storeys,
+                door_time=stops,
+                storey=min(link.begin.storey, link.end.storey),
+            )
+    return tuple(found.values())
+
+
+def _chargers_in(tours: Sequence[Tour], chargers: Sequence[Charger]) -> tuple[Charger, ...]:
+    """Return chargers, and those that tours visit besides, each once."""
+    visits = [Charger(s.global_id, s.cell, s.end) for tour in tours for s in tour.stops if s.kind == "charger"]
+    return tuple({charger.name: charger for charger in (*visits, *chargers)}.values())
+
+
+def _docks_of(tour: Tour, fleet: Sequence[Robot]) -> tuple[Charger, ...]:
+    """Return the chargers that the task names, for robots that tire."""
+    if not any(math.isfinite(robot.battery_wh) for robot in fleet):
+        return ()
+    return tuple(Charger(dock.global_id, dock.cell, dock.end) for dock in find_chargers(tour.graph, tour.start))
 
 
 def _writer(log: list[Event] | None, on_event: Callable[[Event], None] | None) -> Callable[[Event], None]:
@@ -337,7 +358,7 @@ def _targets_of(tours: Sequence[Tour]) -> tuple[str, ...]:
     """Return the GlobalIds of everything there is to visit, also of what the tours leave out."""
     environment = tours[0].graph.environment
     known = [] if environment is None else [target.global_id for target in environment.targets]
-    planned = [stop.global_id for tour in tours for stop in tour.stops]
+    planned = [stop.global_id for tour in tours for stop in tour.stops if stop.kind == "target"]
     lost = [target.global_id for tour in tours for target in tour.unreached]
     return tuple(dict.fromkeys(known + planned + lost))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -28,7 +28,7 @@ from bimnav.sim.lifts import Cabin, Lift
 from bimnav.sim.log import Event, EventKind
 from bimnav.sim.motion import Motion, drive
 from bimnav.sim.people import Walker, first_meeting
-from bimnav.sim.routes import JOINED, Line, cell_near, way_between
+from bimnav.sim.routes import JOINED, Line, cell_near, end_of, way_between
 from bimnav.sim.stretches import Stretch, cut
 from bimnav.sim.track import RobotStatus
 from bimnav.stops import Stop, Unreached
@@ -167,6 +167,7 @@ class World:
         self.kept_clear: tuple[str, float] | None = None
         self._looks: dict[int, tuple[Motion, dict[str, tuple[float, str]]]] = {}
         self._rngs: dict[int, np.random.Generator] = {}
+        self._charger_field: tuple[NavGraph, NDArray[np.float64]] | None = None
         ones = [*self.doors, *self.chargers]
         self.claims.left = {passage.name: passage.capacity for passage in setting.passages} | dict.fromkeys(ones, 1)
         for door in setting.doors:
@@ -232,13 +233,10 @@ class World:
     def asset_of(self, stop: Stop) -> str:
         """Return maker, model and the like of a target, if the model tells."""
         environment = self.agents[0].tour.graph.environment
-        asset = getattr(getattr(environment, "building", None), "asset", None)
-        if asset is None or stop.source != "model":
+        building = getattr(environment, "building", None)
+        if building is None or stop.global_id not in building:
             return ""
-        try:
-            return str(asset(stop.global_id).summary)
-        except BimnavError:
-            return ""
+        return str(building.asset(stop.global_id).summary)
 
     def stretches(self, agent: RobotAgent, line: Line) -> list[Stretch]:
         """Cut a way where it needs a door, a passage or a lift, and where it is slow."""
@@ -286,7 +284,7 @@ class World:
         graph = self.graph_of(agent)
         reach = errand.stop is not None and errand.stop.approach == "reach"
         options = [(errand.cell, errand.end)]
-        options += [(stand.cell, stand.end) for stand in getattr(errand.stop, "candidates", ())]
+        options += [(stand.cell, stand.end) for stand in (errand.stop.candidates if errand.stop else ())]
         begin = cell_near(graph, place, storey)
         if begin is None:
             return None
@@ -296,6 +294,9 @@ class World:
                     line = way_between(graph, place, begin, cell, end, straight_in=reach)
                 except PlanningError:
                     continue
+                if errand.stop is not None and errand.end != end:
+                    stand = next(stand for stand in errand.stop.candidates if stand.end == end)
+                    errand.stop = errand.stop.at(stand)
                 errand.cell, errand.end = cell, end
                 return line if lead is None else _appended(lead, line)
         return None
@@ -440,7 +441,8 @@ class World:
         """
         best: tuple[float, int, int] | None = None
         for agent in self.agents:
-            if agent is besides or agent.is_over or agent.status is RobotStatus.FAILED:
+            able = set(stop.abilities) <= set(agent.robot.abilities)
+            if agent is besides or not able or agent.is_over or agent.status is RobotStatus.FAILED:
                 continue
             graph = self.graph_of(agent)
             if not graph.free[stop.cell]:
@@ -455,9 +457,8 @@ class World:
         errand = Errand(stop, stop.cell, stop.end, len(agent.stops))
         agent.stops.append(stop)
         agent.agenda.insert(best[2], errand)
-        if agent.tour.return_to_start and agent.home is None:
-            start = agent.tour.start_point
-            agent.home = Errand(None, agent.tour.start, start, purpose="return to the start")
+        if agent.home is None and (agent.tour.return_to_start or end_of(agent.tour)[0] != agent.tour.start):
+            agent.home = agent.homeward()
         agent.note("assign", stop, cause or f"the detour is {best[0]:.2f} m")
         agent.disturb(Order("look", "something new to do"))
         return True
@@ -479,11 +480,12 @@ class World:
         """Give what a robot has to do to others; what nobody can do stays with it, or undone."""
         for errand in tuple(agent.agenda):
             assert errand.stop is not None  # noqa: S101 - an agenda holds stops
-            if self.assign(errand.stop, besides=agent, cause=f"{agent.robot.name} failed: {cause}"):
+            why = f"{agent.robot.name} failed: {cause}"
+            if errand.stop.kind == "charger" or self.assign(errand.stop, besides=agent, cause=why):
                 agent.agenda.remove(errand)
             elif agent.is_over:
                 status = agent.status
-                agent.give_up(errand, f"{agent.robot.name} failed: {cause}")
+                agent.give_up(errand, why)
                 agent.become(status)
 
     # --- energy
@@ -498,16 +500,27 @@ class World:
         errand.leg = line
         motion = drive(line.points, line.storeys, agent.robot, heading=agent.heading)
         powers = agent.battery.powers
-        work = self.seconds_at(agent, errand) * powers[RobotStatus.WORKING] if errand.stop is not None else 0.0
-        joules = motion.duration * powers[RobotStatus.MOVING] + work
+        joules = motion.duration * powers[RobotStatus.MOVING]
+        if errand.stop is not None and errand.stop.kind == "charger":
+            return joules
+        if errand.stop is not None:
+            joules += self.seconds_at(agent, errand) * powers[RobotStatus.WORKING]
         if not self.chargers:
             return joules
-        graph = self.knowledge.graph_for(agent.tour.graph, agent.robot)
-        cells = [charger.cell for charger in self.chargers.values() if graph.free[charger.cell]]
-        away = float(distance_field(graph, cells)[errand.cell]) if cells and graph.free[errand.cell] else 0.0
+        away = float(self._to_chargers(agent)[errand.cell])
         if math.isfinite(away):
             joules += away / agent.robot.speed * _DETOUR * powers[RobotStatus.MOVING]
         return joules + _RESERVE * agent.battery.capacity
+
+    def _to_chargers(self, agent: RobotAgent) -> NDArray[np.float64]:
+        """Return the metres from every cell to a charger that a robot can get to."""
+        graph = self.knowledge.graph_for(agent.tour.graph, agent.robot)
+        if self._charger_field is None or self._charger_field[0] is not graph:
+            metric = graph if graph.objective == "distance" else replace(graph, objective="distance")
+            cells = [charger.cell for charger in self.chargers.values() if graph.free[charger.cell]]
+            field = distance_field(metric, cells) if cells else np.full(graph.frame.shape, np.inf)
+            self._charger_field = graph, field
+        return self._charger_field[1]
 
     def _begins_here(self, agent: RobotAgent, line: Line) -> bool:
         return math.dist(line.points[0], agent.place) <= JOINED
