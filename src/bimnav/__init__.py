@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from bimnav._georeference import Georeference as Georeference
     from bimnav._oriented import PosePath as PosePath, find_poses as find_poses
     from bimnav._start import Start as Start, find_start as find_start
+    from bimnav._topology import Topology as Topology, topology as topology
     from bimnav._why import NoRoute as NoRoute, why_unreachable as why_unreachable
     from bimnav.assets import Asset as Asset
     from bimnav.building import (
@@ -112,7 +113,6 @@ if TYPE_CHECKING:
         list_tasks as list_tasks,
         load_task as load_task,
     )
-    from bimnav.topology import Topology as Topology, topology as topology
     from bimnav.verify import (
         Check as Check,
         check_path as check_path,
@@ -159,7 +159,7 @@ _HOMES = {
         "Sensing SimDoor SimResult SpeedLimit TargetReported ZoneHazardous egress_distances find_passages simulate"
     ),
     "bimnav.tasks": "Overruled Rule Standoff Task list_tasks load_task",
-    "bimnav.topology": "Topology topology",
+    "bimnav._topology": "Topology topology",
     "bimnav.verify": "Check check_path check_plan check_poses",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}

@@ -7,8 +7,11 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from bimnav.building import Issue
 from bimnav.errors import OutputError
@@ -125,7 +128,8 @@ def write_mission(mission: Mission, folder: Path) -> Mission:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder} cannot be made a folder: {error.strerror}.", "Name another with --out.") from error
-    storeys = sorted({mission.start.cell.storey, *(stop.cell.storey for stop in mission.tour.stops)})
+    passed = (np.unique(leg.indices[:, 0]).tolist() for leg in mission.tour.legs)
+    storeys = sorted({mission.start.cell.storey, *chain(*passed)})
     files = []
     for storey in storeys:
         name = "plan.png" if len(storeys) == 1 else f"plan-{_slug(mission.environment.storeys[storey].name)}.png"

@@ -225,11 +225,18 @@ def plot_tour(tour: Tour, *, storey: int | None = None, ax: Axes | None = None, 
     storey = tour.start.storey if storey is None else storey
     ax = plot_graph(graph, storey=storey, ax=ax, unit=unit)
     level = graph.frame.elevations[storey]
-    legs = [leg[:, :2] for leg in tour.route if len(leg) and abs(leg[0, 2] - level) < 1e-6]
+    legs, climbs = [], []
+    for leg in tour.route:
+        flat, rising = _parts_at(leg, level)
+        legs += flat
+        climbs += rising
     ax.add_collection(LineCollection(legs, colors=_COLORS["path"], linewidths=1.8, zorder=6, capstyle="round"))
+    ax.add_collection(LineCollection(climbs, colors=_COLORS["path"], linewidths=1.8, zorder=6, linestyles=":"))
     for leg in legs:
         _arrow(ax, leg)
     key: list[Any] = [Line2D([], [], color=_COLORS["path"], linewidth=1.8, label=f"route, {tour.length:.1f} m")]
+    if climbs:
+        key.append(Line2D([], [], color=_COLORS["path"], linewidth=1.8, linestyle=":", label="to another storey"))
     if tour.start.storey == storey:
         ax.plot(*tour.start_point[:2], "s", color=_COLORS["start"], markersize=9, markeredgecolor="white", zorder=8)
         key.append(Line2D([], [], color=_COLORS["start"], marker="s", linestyle="none", label="start"))
@@ -248,6 +255,20 @@ def plot_tour(tour: Tour, *, storey: int | None = None, ax: Axes | None = None, 
     legend = ax.get_legend()
     _key(ax, [*(legend.legend_handles if legend else ()), *key], ["", *names])
     return ax
+
+
+def _parts_at(leg: NDArray[np.float64], level: float) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Return the parts of a leg that lie at a level, and those that leave it or come to it, (n, 2) metres."""
+    on = np.abs(leg[:, 2] - level) < 1e-6
+    kinds = np.where(on[:-1] & on[1:], 0, np.where(np.abs(np.diff(leg[:, 2])) > 1e-6, 1, 2))
+    flat, climbs = [], []
+    for part in np.split(np.arange(len(kinds)), np.flatnonzero(np.diff(kinds)) + 1):
+        points = leg[part[0] : part[-1] + 2] if len(part) else leg[:0]
+        if len(part) and kinds[part[0]] == 0:
+            flat.append(points[:, :2])
+        elif len(part) and kinds[part[0]] == 1 and (on[part[0]] or on[part[-1] + 1]):
+            climbs.append(points[:, :2])
+    return flat, climbs
 
 
 def _shown(graph: NavGraph, storey: int) -> tuple[float, float, float, float]:

@@ -8,12 +8,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav._topology import Node, Topology, topology
 from bimnav._why import NoRoute, why_unreachable
 from bimnav.errors import NoPathError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 from bimnav.plan import Path, find_path
-from bimnav.topology import Node, Topology, topology
 
 __all__ = ["Replan", "Replanner"]
 
@@ -100,7 +100,6 @@ class Replanner:
         if ahead is not None and self._still_holds(before, graph, ahead):
             self.path = ahead
             return Replan(ahead, False, "the way ahead is as it was")
-        closed, opened = _difference(before, graph), _difference(graph, before)
         try:
             found = find_path(graph, self.at, self.goal)
         except NoPathError:
@@ -113,7 +112,7 @@ class Replanner:
             self.path = Path(graph, ahead.indices, ahead.length, _cost_of(graph, ahead))
             return Replan(self.path, False, "the way ahead is still a cheapest one", searched=True)
         self.path = found
-        return self._changed(graph, ahead, found, closed, opened)
+        return self._changed(before, graph, ahead, found)
 
     def _ahead(self, at: Cell | None) -> Path | None:
         """Return what is left of the path from a cell of it on; None if the robot has left the path."""
@@ -137,18 +136,15 @@ class Replanner:
         cells = tuple(ahead.indices.T)
         return bool((graph.cost[cells] == before.cost[cells]).all())
 
-    def _changed(
-        self,
-        graph: NavGraph,
-        ahead: Path | None,
-        found: Path,
-        closed: list[_Thing],
-        opened: list[_Thing],
-    ) -> Replan:
+    def _changed(self, before: NavGraph, graph: NavGraph, ahead: Path | None, found: Path) -> Replan:
         """Say what changed the route: what was closed on the old one, else what was opened on the new one."""
+        on_new = _closing(before, found, _difference(graph, before))
         if ahead is None:
-            return Replan(found, True, "a route was found from where the robot is", (), True)
-        on_old, on_new = _closing(graph, ahead, closed), _closing(ahead.graph, found, opened)
+            text = (
+                f"{_names(on_new)} no longer closes the way" if on_new else "a route was found from where the robot is"
+            )
+            return Replan(found, True, text, tuple(global_id for global_id, _ in on_new), True)
+        on_old = _closing(graph, ahead, _difference(before, graph))
         if on_old:
             causes, text = on_old, f"{_names(on_old)} closed the way"
         elif not _is_valid(graph, ahead):
