@@ -2,16 +2,18 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bimnav.building import Building, Door, Element, Mesh, Shape, Space, Storey
+from bimnav.building import Building, Door, Element, Ledger, Mesh, Shape, Space, Storey
 from bimnav.environment import make_environment
 from bimnav.errors import GridError, ModelError, TaskError
 from bimnav.graph import build_graph
 from bimnav.grid import Cell
 from bimnav.ifc import read_ifc
+from bimnav.mission import run
 from bimnav.robot import Robot
 from bimnav.tasks import Rule, Task
 from tests.conftest import real_model
@@ -306,3 +308,27 @@ def test_the_explanation_of_a_cell_agrees_with_the_graph_on_a_real_model():
         obstacles = {reason.global_id for reason in told.reasons if reason.role == "obstacle"}
         assert bool(obstacles) == bool(graph.obstacle[cell]), cell
         assert told.summary.startswith("free") == bool(graph.free[cell]), cell
+
+
+def test_a_cell_where_something_was_lost_says_so():
+    ledger = Ledger(("gone",), lost={"gone": "the kernel crashed"}, lost_bounds={"gone": [[1, 1, 0], [2, 2, 1]]})
+    building = replace(room_with(Element("gone", "IfcFurniture", "Cupboard")), ledger=ledger)
+    graph = build_graph(make_environment(building, Task("any")), cell_size=0.5)
+    at = graph.frame.cell_at
+    [lost] = [reason for reason in graph.explain(at(1.2, 1.2)).reasons if reason.role == "lost"]
+    assert (lost.name, lost.low, lost.high) == ("Cupboard", 0.0, 1.0)
+    assert lost.rule.endswith("the kernel crashed")
+    assert all(reason.role != "lost" for reason in graph.explain(at(4, 4)).reasons)
+
+
+def test_exits_are_found_like_targets_and_are_none():
+    task = Task("out", exits=[Rule("IfcDoor", ["fire"], label="exit")])
+    environment = make_environment(two_rooms(), task)
+    assert [(way.global_id, way.label, way.storey) for way in environment.exits] == [("door", "exit", 0)]
+    assert environment.targets == ()
+
+
+def test_a_job_makes_least_what_its_task_says(data_ifc):
+    task = Task("look", targets=[Rule("IfcFurniture", ["sofa"])], objective="time", destination="nearest_free")
+    mission = run(read_ifc(data_ifc / "apartment.ifc"), task=task, cell_size=0.2)
+    assert mission.graph.objective == "time"

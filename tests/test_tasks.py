@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
 from bimnav.building import Building, Classification, Element, Facts, Mesh, Shape, Space, Storey
 from bimnav.environment import make_environment
@@ -20,7 +21,8 @@ from bimnav.errors import (
     SelectorError,
     TaskError,
 )
-from bimnav.tasks import Rule, Standoff, Task, list_tasks, load_task, match, task_schema
+from bimnav.tasks import Rule, Standoff, Task, choose, list_tasks, load_task, match, task_schema
+from bimnav.tasks._conditions import parse_condition
 from bimnav.tasks._lint import lint_filters
 from bimnav.tasks._toml import read_toml
 from tests.conftest import real_model
@@ -526,8 +528,7 @@ def test_the_json_schema_accepts_the_library_and_refuses_a_bad_file():
     schema = task_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     judge = jsonschema.Draft202012Validator(schema)
-    library = Path(sys.modules["bimnav.tasks"].__file__).parent / "library"
-    for path in library.glob("*.toml"):
+    for path in Path(sys.modules["bimnav.tasks"].__file__).parent.rglob("*.toml"):
         judge.validate(tomllib.loads(path.read_text(encoding="utf-8")))
     judge.validate(tomllib.loads(GOOD))
     bad = tomllib.loads(BAD)
@@ -889,8 +890,7 @@ filter = "Name=x, IfcWall"
 
 
 def test_the_filters_of_the_library_have_nothing_wrong_with_them():
-    library = Path(sys.modules["bimnav.tasks"].__file__).parent / "library"
-    for path in library.glob("*.toml"):
+    for path in Path(sys.modules["bimnav.tasks"].__file__).parent.rglob("*.toml"):
         assert lint_filters(read_toml(path.read_text(encoding="utf-8"))) == ([], [])
 
 
@@ -915,3 +915,32 @@ def test_a_rule_for_a_class_the_schema_lacks_picks_nothing_and_says_so():
             "is taken for it (column 1).",
         ),
     ]
+
+
+values = st.one_of(st.sampled_from(["", "x", "X", "5", "Existing"]), st.integers(0, 6), st.booleans(), st.floats(0, 6))
+
+
+@given(
+    own=st.one_of(st.none(), values),
+    of_type=st.one_of(st.none(), values),
+    wanted=st.sampled_from(["''", "x", "5", "true"]),
+)
+def test_a_condition_and_its_contrary_never_agree(own, of_type, wanted):
+    facts = Facts({"P": {} if own is None else {"A": own}}, {"P": {} if of_type is None else {"A": of_type}})
+    equal, other = (bool(parse_condition(f"P.A {sign} {wanted}").met_by(facts)) for sign in ("=", "!="))
+    assert equal != other
+
+
+@given(own=st.integers(0, 6), of_type=st.integers(0, 6))
+def test_a_number_of_its_own_hides_that_of_the_type(own, of_type):
+    facts = Facts({"P": {"A": own}}, {"Q": {"A": of_type}})
+    for sign, holds in (("<", own < 3), ("<=", own <= 3), (">", own > 3), (">=", own >= 3), ("=", own == 3)):
+        assert bool(parse_condition(f"*.A {sign} 3").met_by(facts)) == holds
+
+
+@given(st.lists(st.sampled_from("abc"), min_size=1, max_size=4))
+def test_the_first_rule_that_picks_an_element_decides(labels):
+    rules = [Rule("IfcWall", label=label) for label in labels]
+    chosen, overruled = choose(Task("any", targets=rules), "targets", told())
+    assert chosen["plain"].rule.label == labels[0]
+    assert len(overruled) == sum(label != labels[0] for label in labels)

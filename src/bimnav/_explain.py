@@ -303,6 +303,17 @@ def _touching(environment: IndoorEnvironment, storey: int, cell: BaseGeometry) -
         yield from told
         if isinstance(product, Element) and not {r.role for r in told} & {"left out", "lost", "floor"}:
             yield from _out_of_band(environment, product, storey)
+    yield from _lost(building, cell)
+
+
+def _lost(building: Building, cell: BaseGeometry) -> Iterator[Reason]:
+    """Yield what was lost somewhere in a box over the cell."""
+    for global_id, (low, high) in building.ledger.lost_bounds.items():
+        if shapely.box(*low[:2], *high[:2]).intersects(cell):
+            product = _product(building, global_id)
+            name, ifc_class = (product.name, product.ifc_class) if product else ("", "lost product")
+            rule = f"it lies somewhere in this box: {building.ledger.lost[global_id]}"
+            yield Reason(global_id, name, ifc_class, "lost", rule, None, float(low[2]), float(high[2]))
 
 
 def _over(environment: IndoorEnvironment, storey: int, cell: BaseGeometry) -> Iterator[Element | Space]:

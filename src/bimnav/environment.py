@@ -182,6 +182,8 @@ class IndoorEnvironment:
         How every door is, as the task says, and whether the robot may pass it.
     overruled
         Rules that pick an element and do not decide about it, because others go before.
+    exits
+        Ways out, as the task's rules pick them.
     """
 
     building: Building
@@ -198,6 +200,7 @@ class IndoorEnvironment:
     issues: tuple[Issue, ...] = ()
     doors: tuple[DoorAccess, ...] = ()
     overruled: tuple[Overruled, ...] = ()
+    exits: tuple[Target, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -405,7 +408,13 @@ def make_environment(
     if lost:
         message = f"{len(lost)} targets of task {task.name!r} have no geometry, so no place to go to."
         issues += (Issue("target-without-shape", message, lost, "error", "Ask for an export with bodies."),)
-    return replace(environment, targets=tuple(t for t in targets if t is not None), issues=issues)
+    exits = (_found(choice, environment) for choice in choose(task, "exits", building)[0].values())
+    return replace(
+        environment,
+        targets=tuple(t for t in targets if t is not None),
+        exits=tuple(way for way in exits if way is not None),
+        issues=issues,
+    )
 
 
 def rules_overruled(task: Task, building: Building, robot: Robot | None = None) -> tuple[Overruled, ...]:

@@ -136,7 +136,12 @@ def run(
             {"task": loaded.name, "model": building.name},
         )
     graph = build_graph(
-        environment, cell_size=cell_size, connectivity=connectivity, refine=refine, on_conflict=on_conflict
+        environment,
+        cell_size=cell_size,
+        connectivity=connectivity,
+        refine=refine,
+        on_conflict=on_conflict,
+        objective=loaded.objective,
     )
     _refuse_targets_outside(graph, environment)
     begin = find_start(graph, start)
