@@ -1,6 +1,7 @@
 """How fast bimnav reads buildings: ratios to plain ways of doing the same, in CPU time.
 
-    python benchmarks/reading.py [--models real|generated|all] [--only PART ...] [--json FILE] [--publish]
+    python benchmarks/reading.py [--models real|generated|all] [--match TEXT ...] [--only PART ...]
+                                 [--largest N] [--json FILE] [--publish]
 
 prints tables in Markdown; `--publish` also puts them into docs/benchmarks/reading.md. Real models are looked for in
 the folder that the environment variable BIMNAV_REAL_IFC names.
@@ -49,10 +50,10 @@ RASTERS = ("duplex/Duplex_A", "office/Office_A", "generated")
 # --- Measuring.
 
 
-def fastest(*makers: Callable[[], Job], rounds: tuple[int, int] = ROUNDS) -> list[float]:
+def fastest(*makers: Callable[[], Job]) -> list[float]:
     """Return the least CPU seconds of jobs that take turns; each is made anew, untimed, in every round."""
     times: list[list[float]] = []
-    while len(times) < rounds[0] or (len(times) < rounds[1] and np.sum(times) < BUDGET):
+    while len(times) < ROUNDS[0] or (len(times) < ROUNDS[1] and np.sum(times) < BUDGET):
         times.append([cpu(make()) for make in makers])
     return [float(least) for least in np.min(times, axis=0)]
 
@@ -276,7 +277,7 @@ def _cells(path: Path, storeys: Sequence[int], frame: GridFrame) -> NDArray[np.b
 
 
 def growth(folder: Path, sizes: Sequence[int] = SIZES) -> Table:
-    """Follow time and memory from 1,000 to 100,000 products."""
+    """Follow time and memory over the number of products."""
     columns = ("products", "B0 / footprints", "file, MB", "footprints, s", "microseconds for each", "B0, s", "peak, MB")
     table = Table("growth", (*columns, "allowed, MB"))
     for size in sizes:
@@ -298,9 +299,12 @@ def growth(folder: Path, sizes: Sequence[int] = SIZES) -> Table:
 # --- Which models, and the way out.
 
 
-def real_models(folder: Path) -> Iterator[Model]:
-    """Find the files with geometry, the smaller ones first."""
+def real_models(folder: Path, match: Sequence[str]) -> Iterator[Model]:
+    """Find the files with geometry whose names begin with one of some texts, the smaller ones first."""
     for path in sorted(REAL.glob("*/*.ifc*"), key=lambda path: path.stat().st_size):
+        name = f"{path.parent.name}/{path.stem}"
+        if not name.startswith(tuple(match)):
+            continue
         try:
             environment = environment_of(path)
         except BimnavError:
@@ -310,7 +314,7 @@ def real_models(folder: Path) -> Iterator[Model]:
             if path.suffix != ".ifc":
                 text = folder / f"{path.stem}.ifc"
                 text.write_bytes(load(path))
-            yield Model(f"{path.parent.name}/{path.stem}", path, text)
+            yield Model(name, path, text)
 
 
 def generated_model(folder: Path, products: int = 18_000) -> Model:
@@ -368,14 +372,16 @@ def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description="Compare bimnav's reading with plain ways of doing the same.")
     parser.add_argument("--models", choices=("real", "generated", "all"), default="all")
+    parser.add_argument("--match", nargs="+", default=[""], metavar="TEXT", help="real models whose names begin so")
     parser.add_argument("--only", nargs="+", metavar="PART", help="some of the tables, by name")
+    parser.add_argument("--largest", type=int, default=SIZES[-1], metavar="N", help="products to which growth goes")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
     parser.add_argument("--publish", action="store_true", help=f"put the tables into {PAGE.name}")
     chosen = parser.parse_args()
     warm_up()
     with tempfile.TemporaryDirectory(prefix="bimnav-bench-") as name:
         folder = Path(name)
-        models = [*real_models(folder)] if chosen.models != "generated" else []
+        models = [*real_models(folder, chosen.match)] if chosen.models != "generated" else []
         models += [generated_model(folder)] if chosen.models != "real" else []
         parts: dict[str, Callable[[], Table]] = {
             "kernel": lambda: against_kernel(models),
@@ -386,17 +392,17 @@ def main() -> None:
             "peers": lambda: peers(
                 [model for model in models if model.name.startswith(PEERS)] + [generated_model(folder, 1_000)]
             ),
-            "growth": lambda: growth(folder),
+            "growth": lambda: growth(folder, [size for size in SIZES if size <= chosen.largest]),
         }
         tables = []
         for part in chosen.only or parts:
             tables.append(parts[part]())
             print(f"## {part}\n\n{tables[-1]}", flush=True)
+            if chosen.publish:
+                publish(tables[-1:], machine())
     if chosen.json:
         numbers = {"about": machine(), "tables": [asdict(table) for table in tables]}
         chosen.json.write_text(json.dumps(numbers, indent=1, default=str), encoding="utf-8")
-    if chosen.publish:
-        publish(tables, machine())
 
 
 if __name__ == "__main__":
