@@ -11,6 +11,7 @@ import shapely
 from hypothesis import given, settings, strategies as st
 
 import bimnav as bn
+from bimnav._service_check import unserved
 from bimnav._sight import points_on, sight_of
 from bimnav.building import Building, Shape, Space, Storey
 from bimnav.tasks import Rule, Standoff, Task
@@ -109,6 +110,15 @@ def test_only_what_is_higher_than_the_line_of_sight_hides(height, is_hidden):
         assert the_loss(building).blocking == ("shelf",)
     else:
         assert the_stop(building).end[0] < 4.4
+
+
+def test_a_narrow_piece_of_wall_hides_and_a_narrow_post_does_not():
+    valve = box("valve", 4.9, 2.0, 1.0, 5.0, 2.1, 1.1, name="Valve")
+    for ifc_class in ("IfcWall", "IfcMember"):
+        piece = box("piece", 4.8, 1.95, 0.0, 4.89, 2.15, 2.5, ifc_class=ifc_class)
+        stop = the_stop(room(elements=[valve, piece]))
+        is_straight = any(abs(stand.end[1] - 2.05) < 0.06 and stand.end[0] < 4.8 for stand in stop.candidates)
+        assert is_straight == (ifc_class == "IfcMember")
 
 
 def test_a_door_hides_nothing_unless_it_is_locked_and_a_window_does():
@@ -294,11 +304,30 @@ def test_sockets_and_switches_of_the_duplex_are_served_from_their_rooms():
     stops, unreached = graph.stops_from(None)
     assert len(stops) >= 74  # the others are sockets behind a stove, a fridge or a bed, and a board on the facade
     assert all(lost.blocking and lost.miss is not None for lost in unreached)
+    assert not list(unserved([stop.at(stand) for stop in stops for stand in stop.candidates], graph.environment))
     party = next(e for e in building.elements if "Party Wall" in e.name).bounds
     for stop in stops:  # nothing is served through the wall between the two flats
         sides = [np.sign(y - party[:, 1].mean()) for y in (stop.end[1], stop.destination[1])]
         near = abs(stop.destination[1] - party[:, 1].mean()) < 0.25
         assert near or sides[0] == sides[1], stop.name
+
+
+def test_the_judge_refuses_a_stop_behind_a_wall_and_one_too_far_away():
+    valve = box("valve", 3.85, 0.5, 0.9, 4.0, 0.7, 1.1, name="Valve")
+    building = two_rooms(elements=[valve])
+    graph = graph_of(building)
+    tour = bn.plan_tour(graph, graph.frame.cell_at(1.0, 2.0))
+    assert bn.check_plan(tour).ok
+
+    def kinds(x, y):
+        end = (x, y, 0.0)
+        wrong = replace(tour.stops[0], cell=graph.frame.cell_at(x, y), end=end, candidates=())
+        there = bn.plan_tour(graph, tour.start, [wrong])
+        return {violation.kind for violation in bn.check_plan(there).violations}
+
+    assert kinds(4.55, 0.55) == {"hidden"}  # in the other room
+    assert kinds(2.05, 0.55) == {"out-of-reach"}
+    assert kinds(3.55, 0.95) == set()
 
 
 def test_zones_lie_under_things_that_hang_and_under_sheets_on_the_floor():

@@ -22,6 +22,7 @@ LIFTED = 0.1
 
 
 _BIG = 0.6  # metres; what has two sides this long hides things, and what is thinner one looks past
+_WALLS = ("IfcWall", "IfcCurtainWall", "IfcPlate", "IfcWindow", "IfcSlab", "IfcRoof", "IfcColumn")  # of any size
 _SKIN = 0.005  # metres; a line ends this far before its point, which may lie on a surface
 _SAME = 1e-6  # metres
 _ON = 0.2 * math.pi  # half of the solid angle a surface fills: 2 pi inside, pi on a face, pi / 4 on a corner
@@ -52,7 +53,8 @@ class Sight:
         boxes = []
         for element in elements:
             box = None if element.ifc_class in _SEE_THROUGH else element.bounds
-            if box is not None and np.sort(box[1] - box[0])[1] >= _BIG:
+            is_wall = element.ifc_class.startswith(_WALLS)
+            if box is not None and (is_wall or np.sort(box[1] - box[0])[1] >= _BIG):
                 self._elements.append(element)
                 boxes.append(box)
         self._boxes = np.array(boxes, dtype=np.float64).reshape(-1, 2, 3)

@@ -38,6 +38,7 @@ __all__ = [
     "ReaderError",
     "ReaderMemoryError",
     "ReaderTimeoutError",
+    "RobotError",
     "SelectorError",
     "SimulationError",
     "StartBlockedError",

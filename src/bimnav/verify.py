@@ -19,6 +19,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.affinity import affine_transform
 
+from bimnav._service_check import unserved
 from bimnav.errors import GeometryError, UnsafePlanError
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ Kind = Literal[
     "inside",
     "restricted",
     "off-floor",
+    "out-of-reach",
+    "hidden",
 ]
 _CONTACT = ("footprint", "body", "inside", "restricted", "off-floor")
 
@@ -74,8 +77,9 @@ class Violation:
     kind
         `footprint`: the robot reaches into an obstacle in plan view. `body`: its body meets a mesh.
         `inside`: its body lies wholly in a solid. `restricted`: its middle enters a zone where it must
-        never be. `off-floor`: it leaves the floor. `climb`: it takes a stair, ramp or lift that the robot
-        cannot use. All others: the path cannot be judged, or is torn.
+        never be. `off-floor`: it leaves the floor. `out-of-reach`: it stands farther from a target, or lower,
+        than it reaches. `hidden`: a wall stands between it and its target. `climb`: it takes a stair, ramp or
+        lift that the robot cannot use. All others: the path cannot be judged, or is torn.
     message
         What was found, where, and how deep.
     point : (x, y, z), metres
@@ -311,10 +315,11 @@ def check_plan(tour: Tour) -> Check:
 
     A tour over a graph made from a mask is judged against the boxes of its blocked cells. A tour that has
     stops but no route is refused; of a tour that goes nowhere the start is judged. A stop that is reached
-    although its cell is blocked gets no mercy.
+    although its cell is blocked gets no mercy. From a standing stop the target must be in reach, and no wall
+    may hide it.
     """
     route = [_polyline(line) for line in tour.route]
-    torn = list(_tears(tour, route))
+    torn = [*_tears(tour, route), *_unserved(tour)]
     legs: list[_Leg] = list(enumerate(route)) or [(None, _polyline([tour.start_point]))]
     environment = tour.graph.environment
     world = _blocked_cells(tour.graph) if environment is None else _surroundings(environment, ())
@@ -372,6 +377,13 @@ def _tears(tour: Tour, route: Sequence[NDArray[np.float64]]) -> Iterator[Violati
                 depth = tear if math.isfinite(tear) else 0.0
                 yield _refusal(kind, f"the route does not {verb} where it should but", line[k], depth, leg=leg)
         before = line[-1]
+
+
+def _unserved(tour: Tour) -> Iterator[Violation]:
+    """Find standing stops from which their target is out of reach or hidden."""
+    environment = tour.graph.environment
+    for kind, text, leg, stop, depth in unserved(tour.stops, environment) if environment else ():
+        yield _refusal(kind, text, stop.end, depth, (stop.global_id, stop.name), stop.cell.storey, leg)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
