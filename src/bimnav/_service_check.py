@@ -49,7 +49,8 @@ def unserved(stops: Sequence[Stop], environment: IndoorEnvironment) -> Iterator[
     left_out = {g for g, why in environment.left_out if why.startswith(("ignored", "target", "entourage"))}
     known = [(wall, box) for wall, box in boxes if wall.global_id not in left_out]
     for leg, stop in enumerate(stops):
-        if stop.approach != "standing" or stop.kind != "target":
+        # a tour made by hand may have stops that say no more than where they end
+        if getattr(stop, "approach", "") != "standing" or getattr(stop, "kind", "target") != "target":
             continue
         robot, name = environment.robot, stop.name or stop.global_id
         is_known = stop.global_id in environment.building
