@@ -170,7 +170,7 @@ def test_renamed_classes_are_found(house: Building):
 
 
 def test_classes_younger_than_the_schema_are_found_by_their_types():
-    building = read_ifc(real_model("office/Office_A_20110811.ifc"), cache=False)
+    building = read_ifc(real_model("office/Office_A_20110811.ifc"))
     terminals = building.select("IfcSanitaryTerminal")
     assert terminals
     assert {terminal.ifc_class for terminal in terminals} == {"IfcFlowTerminal"}
