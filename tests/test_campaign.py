@@ -57,8 +57,10 @@ class Said:
         self.strings.append(match[0])
         return f"'{len(self.strings) - 1}'"
 
-    def string(self, kept: str) -> str:
-        return "".join(self.strings[int(number)] for number in re.findall(r"'(\d+)'", kept))
+    def text(self, argument: str) -> str:
+        """The text that an argument is; empty if it is something else."""
+        kept = re.fullmatch(r"\s*'(\d+)'\s*", argument)
+        return self.strings[int(kept[1])][1:-1] if kept else ""
 
     @property
     def products(self) -> dict[int, int]:
@@ -85,7 +87,7 @@ class Said:
             if kind not in known_classes() or SOLID.match(kind):
                 return True
             if kind == "IFCSHAPEREPRESENTATION":
-                if self.string(values[1])[1:-1].lower() in NO_BODY:
+                if self.text(values[1]).lower() in NO_BODY:
                     continue
                 values = values[3:]
             if kind != "IFCGEOMETRICSET":
@@ -182,7 +184,7 @@ def silent_losses(building: Building, text: str) -> Iterator[str]:
         yield f"silent: {len(shapes)} products in the text, {len(asked)} asked"
     ids = {}
     for number in shapes:
-        ids.setdefault(said.string(said.entities[number][1].split(",")[0])[1:-1], []).append(number)
+        ids.setdefault(said.text(said.entities[number][1].split(",")[0]), []).append(number)
     for global_id, numbers in ids.items():
         if re.fullmatch(r"[\w$]{22}", global_id, re.ASCII) and global_id not in asked:
             yield f"silent: {global_id} was not asked"

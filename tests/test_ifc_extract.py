@@ -436,8 +436,19 @@ def test_a_damaged_representation_costs_its_own_product_only():
     broken.Representation.Representations[0].Items = [sketch.file.by_type("IfcMappedItem")[0]]
     building = sketch.read()
     assert building.ledger.read == (wall.GlobalId,)
-    assert "refers to nothing" in building.ledger.lost[broken.GlobalId]
+    assert "its representation is empty" in building.ledger.lost[broken.GlobalId]
     assert_ledger_closes(building)
+
+
+@pytest.mark.parametrize(("kind", "is_lost"), [("SweptSolid", True), ("Brep", True), ("Curve2D", False), (None, False)])
+def test_a_representation_that_says_solid_and_holds_none_is_lost(kind, is_lost):
+    sketch = Sketch()
+    line = sketch.make("IfcPolyline", [sketch.point(0, 0), sketch.point(1, 0)])
+    beam = sketch.add("IfcBeam", sketch.shape(line))
+    beam.Representation.Representations[0].RepresentationType = kind
+    building = sketch.read()
+    assert (beam.GlobalId in building.ledger.lost) == is_lost
+    assert (building.ledger.left_out == {beam.GlobalId: "no-body"}) != is_lost
 
 
 def test_the_heartbeat_names_every_product_before_it_is_touched_and_crashed_ones_are_skipped():

@@ -27,7 +27,7 @@ __all__ = ["Heartbeat", "extract", "to_building"]
 Heartbeat = Callable[[int, int, str], None]
 
 _CRASHED = "it crashed the geometry kernel"
-_DAMAGED = "its representation is empty, or refers to nothing or to something else than a shape"
+_DAMAGED = "its representation is empty, or holds nothing or something else than the shapes it says"
 
 
 def _silent(done: int, total: int, global_id: str) -> None:

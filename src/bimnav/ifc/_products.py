@@ -59,6 +59,19 @@ _NO_BODY = frozenset(
         "walkingline",
     ]
 )
+_OF_SOLIDS = frozenset(
+    [
+        "advancedbrep",
+        "advancedsweptsolid",
+        "brep",
+        "clipping",
+        "csg",
+        "solidmodel",
+        "surfacemodel",
+        "sweptsolid",
+        "tessellation",
+    ]
+)
 _SOLIDS = (
     "IfcSolidModel",
     "IfcBooleanResult",
@@ -182,7 +195,7 @@ class BodyFinder:
         Raises
         ------
         AttributeError, RuntimeError, TypeError
-            If its representation is empty or holds something else than shapes.
+            If its representation is empty, or holds something else than shapes or than it says.
         """
         solids: dict[int, Entity] = {}
         contexts: set[int] = set()
@@ -210,6 +223,8 @@ class BodyFinder:
                 self._is_solid[name] = any(item.is_a(solid) for solid in _SOLIDS)
             if self._is_solid[name]:
                 found[item.id()] = item
+        if not found and str(representation.RepresentationType).casefold() in _OF_SOLIDS:
+            raise TypeError(f"{representation.RepresentationType} without a solid")
         return found
 
 

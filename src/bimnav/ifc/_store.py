@@ -54,6 +54,7 @@ _DIGEST = hashlib.sha256().digest_size
 _SUFFIX = ".bimnav"
 _LOCKS = "locks"
 _POLL = 0.05  # seconds
+_LOCKABLE = 2**31 - 1  # bytes of a file, on Windows
 _TABLES = "tables"
 _DECIDING = ("bimnav", "ifcopenshell", "manifold3d", "numpy")  # packages that decide what a model becomes
 _ARRAYS = {  # name: kind of its numbers and its shape without the first axis
@@ -275,7 +276,7 @@ class Cache:
         try:
             has_waited = False
             deadline = time.monotonic() + patience
-            while not _has_locked(handle, int(key[:15], 16)) and time.monotonic() < deadline:
+            while not _has_locked(handle, int(key[:15], 16) % _LOCKABLE) and time.monotonic() < deadline:
                 has_waited = True
                 waiting()
                 time.sleep(_POLL)

@@ -42,6 +42,7 @@ _LOG = logging.getLogger(__name__)
 _QUARANTINE_LIMIT = 8
 _PATIENT = 4  # stalls that a reading has time for, with a rest to read the file without what stalls
 _LONGEST_LINE = 1 << 16
+_TICK = 0.5  # seconds; on Windows Ctrl-C does not interrupt a wait
 _LEAST_SILENCE = 5.0  # seconds; a busy machine may take as long to start the process
 _LEAST_MEMORY = 1024**3
 _NEARLY = 0.5  # of the memory allowed, resident at death: it died of memory
@@ -289,20 +290,23 @@ class _Attempt:
 
     def _follow(self, process: subprocess.Popen[bytes], lines: queue.SimpleQueue[bytes | None], folder: Path) -> None:
         """Listen until the process is done; raise what it raises, or what became of it."""
+        heard = time.monotonic()
         while True:
-            left = self.deadline - time.monotonic()
+            now = time.monotonic()
+            left, patience = self.deadline - now, heard + self.silence - now
             if left <= 0:
                 self._fail(
                     ReaderTimeoutError,
                     f"was not read within {self.limits.timeout:.4g} s",
                     "Allow more time (timeout=), or split the model.",
                 )
-            try:
-                line = lines.get(timeout=min(left, self.silence))
-            except queue.Empty:
-                if left <= self.silence:
-                    continue
+            if patience <= 0:
                 self._fail(ReaderTimeoutError, f"kept the reader silent for {self.silence:.0f} s", suspect=self.suspect)
+            try:
+                line = lines.get(timeout=min(left, patience, _TICK))
+            except queue.Empty:
+                continue
+            heard = time.monotonic()
             if line is None:
                 self._died(*_reap(process), folder)
             match _parsed(line):
