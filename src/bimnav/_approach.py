@@ -22,6 +22,8 @@ from bimnav.stops import Approach, Stand, Stop, Unreached
 from bimnav.tasks import Standoff
 
 if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
     from bimnav.environment import IndoorEnvironment, Obstacle, Target
     from bimnav.graph import NavGraph
 
@@ -264,10 +266,19 @@ class _Search:
             usable &= np.abs(away - wish.distance) <= 0.75 * self.graph.frame.cell_size
             usable &= self._on_side(wish.side)
         elif wish == "nearest_free" and self.target.footprint is not None:
-            usable &= ~shapely.intersects_xy(self.target.footprint, self.centers[:, :2])
+            beside = usable & ~shapely.intersects_xy(self._beside(), self.centers[:, :2])
+            under = ~shapely.intersects_xy(self.target.footprint, self.centers[:, :2])
+            usable = beside if beside.any() else usable & under
         chosen = np.flatnonzero(usable)
         keys = (self.cells[chosen, 2], self.cells[chosen, 1], np.round(rank[chosen], 9))
         return chosen[np.lexsort(keys)], nearest
+
+    def _beside(self) -> BaseGeometry:
+        """Return where the robot would be on a target, or its body in one that it could run into, such as a door."""
+        assert self.target.footprint is not None  # noqa: S101 - the caller has seen to it
+        low = float(self.aim.points[:, 2].min()) - self.level
+        is_met = self.robot.low < float(self.aim.points[:, 2].max()) - self.level and low < self.robot.height
+        return self.target.footprint.buffer(self.robot.radius) if is_met else self.target.footprint
 
     def _distances(self) -> NDArray[np.float64]:
         """(cells, points), in plan view, metres."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
@@ -377,6 +378,7 @@ def make_environment(
 
     visited, overruled = choose(task, "targets", building)
     blocks = what_blocks(task, building, visited)
+    visited, of_parts = _embodied(visited, building)
     access, doors_overruled = door_access(task, building, robot)
     obstacles = (
         *_obstacles(blocks.candidates, robot, levels, walkable),
@@ -399,7 +401,7 @@ def make_environment(
         outside_bands=tuple(e.global_id for e, _ in blocks.candidates if e.global_id not in blocking),
         issues=issues,
         doors=access,
-        overruled=(*overruled, *blocks.overruled, *doors_overruled, *zones_overruled),
+        overruled=(*overruled, *of_parts, *blocks.overruled, *doors_overruled, *zones_overruled),
     )
     targets = [_found(choice, environment) for choice in visited.values()]
     home = None if start is None else environment.storeys_at(start)[0]
@@ -415,6 +417,35 @@ def make_environment(
         exits=tuple(way for way in exits if way is not None),
         issues=issues,
     )
+
+
+def _embodied(visited: Mapping[str, Choice], building: Building) -> tuple[dict[str, Choice], tuple[Overruled, ...]]:
+    """Give targets without a body those of their parts; parts picked by the same label are then no targets."""
+    from bimnav.tasks import Overruled
+
+    parts = defaultdict[str, list[Element]](list)
+    for element in building.elements:
+        if element.parent:
+            parts[element.parent].append(element)
+    whole, overruled = dict(visited), []
+    for global_id, choice in visited.items():
+        if choice.element.shapes or global_id not in parts:
+            continue
+        found, pending = [], list(parts[global_id])
+        while pending:
+            part = pending.pop()
+            found.append(part)
+            pending += parts.pop(part.global_id, ())
+        found.sort(key=lambda part: part.global_id)
+        shapes = tuple(shape for part in found for shape in part.shapes)
+        whole[global_id] = choice._replace(element=replace(choice.element, shapes=shapes))
+        for part in found if shapes else ():
+            other = visited.get(part.global_id)
+            if other is not None and other.rule.label == choice.rule.label:
+                whole.pop(part.global_id, None)
+                told = f"a part of the target {choice.element.name} ({global_id})"
+                overruled.append(Overruled(part.global_id, other.why, told))
+    return whole, tuple(overruled)
 
 
 def rules_overruled(task: Task, building: Building, robot: Robot | None = None) -> tuple[Overruled, ...]:
@@ -521,7 +552,7 @@ def _found(choice: Choice, environment: IndoorEnvironment) -> Target | None:
     task = environment.task
     return Target(
         product.global_id,
-        product.name,
+        product.label if isinstance(product, Space) else product.name or product.type_name or product.ifc_class,
         storey,
         destination,
         polygon,

@@ -35,6 +35,7 @@ __all__ = ["figure_bytes", "plot_environment", "plot_graph", "plot_tour", "save_
 Unit = Literal["m", "ft"]
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart, and greys
+_LISTED = 40  # stops named beside a plan; a longer list makes the figure taller than any page
 _COLORS = {
     "wall": "#4a4a4a",
     "furniture": "#a89f91",
@@ -243,15 +244,17 @@ def plot_tour(tour: Tour, *, storey: int | None = None, ax: Axes | None = None, 
     names = []
     for number, stop in enumerate(tour.stops, 1):
         aside = f" (from {stop.distance:.2f} m)" if stop.approach == "standing" else ""
-        names.append(f"{number}  {stop.name}{aside}")
         if stop.cell.storey == storey:
+            names.append(f"{number}  {stop.name}{aside}")
             if stop.approach == "standing":
                 ax.plot(*zip(stop.end[:2], stop.destination[:2], strict=True), ":", color=_COLORS["target"], zorder=7)
             _mark(ax, stop.destination, str(number), _COLORS["target"])
     for target in tour.unreached:
-        names.append(f"×  {target.name}: not reached")
         if abs(target.destination[2] - level) < 1e-6:
+            names.append(f"×  {target.name}: not reached")
             _mark(ax, target.destination, "×", _COLORS["lost"])
+    if len(names) > _LISTED:
+        names = [*names[:_LISTED], f"... and {len(names) - _LISTED} more"]
     legend = ax.get_legend()
     _key(ax, [*(legend.legend_handles if legend else ()), *key], ["", *names])
     return ax
