@@ -240,3 +240,18 @@ def test_the_storeys_of_a_real_model_are_joined_and_the_way_is_safe(name, kinds)
         path = bn.find_path(graph, link.begin, link.end)
         assert path.length <= link.length + 1e-9
         assert check_path(path.points, graph.environment).ok
+
+
+LONG = bn.Robot(name="long", outline=((0.5, 0.25), (-0.5, 0.25), (-0.5, -0.25), (0.5, -0.25)), max_riser=0.21)
+
+
+@pytest.mark.parametrize("kind", ["stair", "lift"])
+def test_a_long_robot_gets_on_farther_away(kind):
+    building = two_storeys(kind)
+    graph = graph_of(building, LONG)
+    assert LONG.radius > 0.5
+    assert LONG.half_width == 0.25
+    (link,) = graph.connectors
+    path = across(graph)
+    assert check_path(path.points, graph.environment).ok
+    assert link.length > across(graph_of(building)).rides[0][1].length

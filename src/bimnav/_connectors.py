@@ -24,6 +24,8 @@ __all__ = ["Ascent", "describe_connectors"]
 
 _TREAD = 0.05  # square metres; a smaller level face is a nosing or a handrail
 _LEAST_RISE, _MOST_RISE = 0.06, 0.30  # metres from tread to tread
+_STRAY = 0.05  # metres that a straight way may stray to its sides
+_CLEAR = 0.05  # metres that a robot keeps from the first tread when it gets on
 _BEFORE = 0.4  # metres from the first tread, ramp edge or lift door at which one gets on
 _PLATE = 0.12  # metres; a tread is no thicker
 _STEEP = 0.7  # least z of the normal of a face that a ramp is walked on
@@ -67,6 +69,8 @@ class Ascent:
         geometry shows none.
     doors
         GlobalIds of the doors of a lift.
+    outward : tuple of (x, y)
+        For each level, the direction of length 1 in which one gets off.
     """
 
     global_id: str
@@ -84,11 +88,28 @@ class Ascent:
     riser: float | None = None
     way: tuple[Point, ...] = ()
     doors: tuple[str, ...] = ()
+    outward: tuple[tuple[float, float], ...] = ()
 
-    def line(self, first: int = 0, last: int = -1) -> NDArray[np.float64]:
-        """Return the way over it, (n, 3), with where one gets on and off; of a lift, between two of its levels."""
+    @property
+    def is_straight(self) -> bool:
+        """Whether one does not turn on the way, in plan view."""
+        way = np.array(self.way)[:, :2]
+        ahead = _unit(way[-1] - way[0])
+        return bool((np.abs((way - way[0]) @ (-ahead[1], ahead[0])) <= _STRAY).all())
+
+    def line(self, first: int = 0, last: int = -1, *, radius: float = 0.0) -> NDArray[np.float64]:
+        """Return the way over it, (n, 3), with where one gets on and off; of a lift, between two of its levels.
+
+        Parameters
+        ----------
+        radius
+            Of a robot, metres; a large one gets on farther away, where it is clear of the first tread.
+        """
         inner = [self.way[first], self.way[last]] if self.kind == "lift" else self.way
-        return np.array([self.entries[first], *inner, self.entries[last]])
+        line = np.array([self.entries[first], *inner, self.entries[last]])
+        farther = max(radius + _CLEAR - _BEFORE, 0.0)
+        line[[0, -1], :2] += farther * np.array([self.outward[first], self.outward[last]])
+        return line
 
 
 def describe_connectors(building: Building) -> tuple[Ascent, ...]:
@@ -140,9 +161,8 @@ class _Survey:
         way = np.column_stack([np.vstack([foot, centers, head]), heights])
         middling = 2.5 * np.median([plan.area for _, plan in treads])  # a landing is larger
         widths = [_longest(plan) for _, plan in treads if plan.area <= middling]
-        ends = foot - _BEFORE * ahead, head + _BEFORE * onward
         steps = len(treads) + (high - last > _EDGE)
-        return self._ascent(connector, way, ends, width=min(widths, default=None), steps=steps, riser=riser)
+        return self._ascent(connector, way, (-ahead, onward), width=min(widths, default=None), steps=steps, riser=riser)
 
     def _ramp(self, connector: Connector, shapes: Sequence[Shape]) -> Ascent | None:
         flights = sorted((f for shape in shapes if (f := _flight(shape))), key=lambda flight: flight[0][2])
@@ -151,20 +171,21 @@ class _Survey:
         way = np.array([point for low, high, _ in flights for point in (low, high)])
         slopes = [(high[2] - low[2]) / np.hypot(*(high - low)[:2]) for low, high, _ in flights]
         ahead, onward = _unit((way[1] - way[0])[:2]), _unit((way[-1] - way[-2])[:2])
-        ends = way[0, :2] - _BEFORE * ahead, way[-1, :2] + _BEFORE * onward
         for k in (0, -1):
             way[k, 2] = self._floor_near(way[k, 2] - NEAR, way[k, 2] + NEAR, way[k, 2])
-        return self._ascent(connector, way, ends, width=min(width for *_, width in flights), slope=float(max(slopes)))
+        return self._ascent(
+            connector, way, (-ahead, onward), width=min(width for *_, width in flights), slope=float(max(slopes))
+        )
 
     def _lift(self, connector: Connector, shapes: Sequence[Shape]) -> Ascent | None:
         plan = unite(outline([shape]) for shape in shapes)
-        stops: dict[float, tuple[NDArray[np.float64], float]] = {}
+        stops: dict[float, tuple[NDArray[np.float64], float, NDArray[np.float64]]] = {}
         doors = []
         for global_id, way in self._ways_near(plan):
             if connector.low - NEAR <= way.bottom <= connector.high - _HEADROOM:
                 away = way.across * (1 if (way.center - plan.centroid.coords[0]) @ way.across > 0 else -1)
                 level = self._floor_near(way.bottom - NEAR, way.bottom + NEAR, way.bottom)
-                stops[level] = way.center + (way.depth / 2 + _BEFORE) * away, way.width
+                stops[level] = way.center + (way.depth / 2 + _BEFORE) * away, way.width, away
                 doors.append(global_id)
         if not stops:
             return None
@@ -178,9 +199,10 @@ class _Survey:
             tuple(self.ground.storey_at(level) for level in levels),
             tuple((*stops[level][0].tolist(), level) for level in levels),
             levels[-1] - levels[0],
-            width=min(width for _, width in stops.values()),
+            width=min(width for _, width, _ in stops.values()),
             way=tuple((x, y, level) for level in levels),
             doors=tuple(doors),
+            outward=tuple((float(x), float(y)) for x, y in (stops[level][2] for level in levels)),
         )
 
     def _ways_near(self, plan: BaseGeometry) -> Iterable[tuple[str, Doorway]]:
@@ -216,14 +238,17 @@ class _Survey:
         return float(near[0 if np.isnan(wanted) else np.abs(near - wanted).argmin()])
 
     def _ascent(
-        self, connector: Connector, way: NDArray[np.float64], ends: Iterable[NDArray[np.float64]], **known: Any
+        self, connector: Connector, way: NDArray[np.float64], outward: Iterable[NDArray[np.float64]], **known: Any
     ) -> Ascent:
-        """Describe a connector by the way over it, (n, 3), and the points before and behind it."""
+        """Describe a connector by the way over it, (n, 3), and the directions in which one gets off at its ends."""
+        away = [(float(x), float(y)) for x, y in outward]
+        ends = [way[k, :2] + _BEFORE * np.array(away[k]) for k in (0, -1)]
         low, high = way[[0, -1], 2].tolist()
         legs = np.diff(way, axis=0)
         run = float(np.hypot(*legs[:, :2].T).sum())
         points = tuple((x, y, z) for x, y, z in way.tolist())
-        found: dict[str, Any] = {"slope": (high - low) / run if run > 0 else None, "way": points}
+        slope = (high - low) / run if run > 0 else None
+        found: dict[str, Any] = {"slope": slope, "way": points, "outward": tuple(away)}
         return Ascent(
             connector.global_id,
             connector.name,

@@ -119,7 +119,9 @@ def is_near_connector(environment: IndoorEnvironment, frame: GridFrame, cells: N
     if not ascents or not len(cells):
         return False
     points = frame.centers_of(np.column_stack(np.unravel_index(cells, frame.shape)))
-    ends = np.concatenate([ascent.line() for ascent in ascents if ascent.way] or [_NO_POINTS])[:, :2]
+    ends = np.concatenate(
+        [ascent.line(radius=environment.robot.radius) for ascent in ascents if ascent.way] or [_NO_POINTS]
+    )[:, :2]
     low, high = points[:, :2].min(axis=0) - _AROUND, points[:, :2].max(axis=0) + _AROUND
     margin = 2 * frame.cell_size
     return bool(((ends >= low - margin) & (ends <= high + margin)).all(axis=1).any())
@@ -168,10 +170,16 @@ def _why_unfit(ascent: Ascent, robot: Robot) -> str:
     elif ascent.slope is None or ascent.slope > robot.max_slope:
         slope = "unknown" if ascent.slope is None else f"{ascent.slope:.3f}"
         return f"its slope is {slope}; the robot drives up to {robot.max_slope:g}"
-    if robot.radius and (ascent.width is None or ascent.width < 2 * robot.radius):
+    half = _half_width(ascent, robot)
+    if half and (ascent.width is None or ascent.width < 2 * half):
         width = "of unknown width" if ascent.width is None else f"{ascent.width:.2f} m wide"
-        return f"it is {width}; the robot is {2 * robot.radius:.2f} m"
+        return f"it is {width}; the robot is {2 * half:.2f} m"
     return ""
+
+
+def _half_width(ascent: Ascent, robot: Robot) -> float:
+    """Return how far a robot reaches to the sides on a connector: where it has to turn, as far as anywhere."""
+    return robot.half_width if ascent.is_straight else robot.radius
 
 
 class _Joints:
@@ -220,14 +228,17 @@ class _Joints:
 
     def _ways(self, ascent: Ascent, reasons: list[str]) -> Iterator[tuple[NDArray[np.float64], Cell, Cell]]:
         """Yield the ways between neighboring stops of a connector, of a lift between any two, and their cells."""
+        radius = self.environment.robot.radius
         if ascent.kind == "lift":
-            cells = [self._cell_near(ascent, np.array(entry), reasons) for entry in ascent.entries]
+            entries = [ascent.line(k, k, radius=radius)[0] for k in range(len(ascent.levels))]
+            cells = [self._cell_near(ascent, entry, reasons) for entry in entries]
             for first, last in combinations(range(len(cells)), 2):
                 begin, end = cells[first], cells[last]
                 if begin is not None and end is not None:
-                    yield self._leveled(ascent.line(first, last), begin, end), begin, end
+                    way = ascent.line(first, last, radius=radius)
+                    yield self._leveled(way, begin, end), begin, end
             return
-        line = ascent.line()
+        line = ascent.line(radius=radius)
         between = np.abs(line[:, 2:] - self.environment.levels).min(axis=1) <= _FLUSH
         between &= (line[:, 2] > line[0, 2] + _FLUSH) & (line[:, 2] < line[-1, 2] - _FLUSH)
         stops = [(0, self._cell_near(ascent, line[0], reasons))]
@@ -301,7 +312,7 @@ class _Joints:
             if ascent.kind == "lift" and a[2] != b[2]:
                 continue  # the car goes where it goes
             line = shapely.LineString([a[:2], b[:2]]) if (a[:2] != b[:2]).any() else shapely.Point(a[:2])
-            body = grown(line, robot.radius)
+            body = grown(line, _half_width(ascent, robot))
             bottom, top = min(a[2], b[2]) + foot, max(a[2], b[2]) + robot.height
             for element in near:
                 if element.global_id not in found and part_in(element.shapes, bottom, top).intersects(body):

@@ -132,6 +132,11 @@ class Robot:
             self._take_outline(self.outline)
 
     @property
+    def half_width(self) -> float:
+        """Half of what the body takes to the sides when it drives straight ahead, metres."""
+        return self.radius if self.outline is None else max(abs(y) for _, y in self.outline)
+
+    @property
     def low(self) -> float:
         """Height above the floor from which on things block, metres."""
         return self.step_height if self.ground_clearance is None else min(self.step_height, self.ground_clearance)

@@ -415,6 +415,7 @@ class _Way:
     own: Collection[str] = ()  # GlobalIds of what it is made of
     step: float = 0.0  # metres between its ends and the floors there that the robot takes
     foot: float = 0.0  # metres above it from which on the body is judged
+    radius: float = 0.0  # how far the body reaches to the sides
     unfit: str = ""
 
 
@@ -426,11 +427,12 @@ def _ways(environment: IndoorEnvironment) -> Iterator[_Way]:
         if not ascent.way:
             continue
         is_lift, is_stair = ascent.kind == "lift", ascent.kind == "stair"
+        half = robot.half_width if ascent.is_straight else robot.radius  # a long body cannot turn on a narrow way
         faults = {
             "it does not ride in lifts": is_lift and not robot.uses_lifts,
             "its risers are too high": is_stair and not (ascent.riser or math.inf) <= robot.max_riser,
             "it is too steep": ascent.kind == "ramp" and not (ascent.slope or math.inf) <= robot.max_slope,
-            "it is too narrow": robot.radius > 0 and not (ascent.width or 0) >= 2 * robot.radius,
+            "it is too narrow": half > 0 and not (ascent.width or 0) >= 2 * half,
         }
         unfit = next((fault for fault, is_true in faults.items() if is_true), "")
         step = (max(robot.step_height, robot.max_riser) if is_stair else robot.step_height) + _CLOSE
@@ -439,7 +441,8 @@ def _ways(environment: IndoorEnvironment) -> Iterator[_Way]:
         stops = range(len(ascent.levels))
         for first, last in combinations(stops, 2) if is_lift else [(0, -1)]:
             owner = ascent.global_id, ascent.name
-            yield _Way(owner, ascent.line(first, last), is_lift, own, step, min(foot, robot.height / 2), unfit)
+            line = ascent.line(first, last, radius=robot.radius)
+            yield _Way(owner, line, is_lift, own, step, min(foot, robot.height / 2), half, unfit)
 
 
 def _surroundings(environment: IndoorEnvironment, ignore: Collection[str]) -> _World:
@@ -658,7 +661,7 @@ def _check_climb(
             low, high = sorted((float(begin[2]), float(end[2])))
             track = _track(-1, high, [(leg, np.array([begin[:2], end[:2]]))])
             band = way.foot, world.band[1] - (high - low)
-            slice_ = replace(world, elements=solids, bounds=bounds, band=band)
+            slice_ = replace(world, elements=solids, bounds=bounds, band=band, radius=way.radius)
             clearance = min(clearance, _check_bodies(track, slice_, body_of, hits))
     worst = {(hit.kind, hit.global_id): hit for hit in sorted(hits, key=lambda hit: hit.depth)}
     found += [replace(hit, storey=None) for hit in worst.values()]
