@@ -45,7 +45,8 @@ def script(tmp_path: Path, name: str, text: str) -> Callable[..., subprocess.Pop
     """Write a program and return what starts it."""
     path = tmp_path / f"{name}.py"
     path.write_text(textwrap.dedent(text))
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1] / "src")}
+    root = Path(__file__).parents[1]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(root / "src"), str(root)])}
 
     def start(*arguments: object) -> subprocess.Popen[str]:
         command = [sys.executable, str(path), *map(str, arguments)]
