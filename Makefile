@@ -25,7 +25,7 @@ help:
 
 demo: .venv/made
 	$(BIN)/bimnav run data/ifc/apartment.ifc --task cleaning --cell 0.5ft --out out
-	@echo "the figure is out/plan.png"
+	@echo "the figure is out/plan.png, the replay page out/replay.html"
 
 lint: .venv/made-dev
 	$(BIN)/ruff format --check

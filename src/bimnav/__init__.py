@@ -70,7 +70,16 @@ if TYPE_CHECKING:
         plan_tour as plan_tour,
         plan_tours as plan_tours,
     )
-    from bimnav.plot import plot_environment as plot_environment, plot_graph as plot_graph, plot_tour as plot_tour
+    from bimnav.plot import (
+        animate as animate,
+        plot_building as plot_building,
+        plot_environment as plot_environment,
+        plot_field as plot_field,
+        plot_fleet as plot_fleet,
+        plot_graph as plot_graph,
+        plot_timeline as plot_timeline,
+        plot_tour as plot_tour,
+    )
     from bimnav.readiness import (
         DoorCheck as DoorCheck,
         Readiness as Readiness,
@@ -148,7 +157,7 @@ _HOMES = {
         "Assignment Charge Path StopOrder TeamPlan Tour assign_stops distance_field distance_matrix find_path "
         "order_stops plan_tour plan_tours"
     ),
-    "bimnav.plot": "plot_environment plot_graph plot_tour",
+    "bimnav.plot": ("animate plot_building plot_environment plot_field plot_fleet plot_graph plot_timeline plot_tour"),
     "bimnav.readiness": "DoorCheck Readiness RoomCheck StoreyCheck doors_of",
     "bimnav.replan": "Replan Replanner",
     "bimnav.robot": "Robot",

@@ -140,7 +140,8 @@ def write_mission(mission: Mission, folder: Path) -> Mission:
     route = csv_text(("x", "y", "storey", "time"), mission.result.route_rows())
     write_text(folder / "route.csv", route)
     write_text(folder / "events.csv", mission.result.log.to_csv())
-    files += [folder / "route.csv", folder / "events.csv", folder / "report.json"]
+    mission.result.to_html(folder / "replay.html")
+    files += [folder / name for name in ("route.csv", "events.csv", "replay.html", "report.json")]
     mission = replace(mission, files=tuple(files))
     text = json.dumps(mission.report(), indent=2, ensure_ascii=False, allow_nan=False)
     write_text(folder / "report.json", text + "\n")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav._files import write_text
 from bimnav.errors import InputError, MissingExtraError, ValueRangeError
 from bimnav.robot import Robot
 from bimnav.sim.clearance import (
@@ -24,6 +25,8 @@ from bimnav.sim.people import Person, Walker
 from bimnav.sim.track import RobotState, RobotStatus, Track
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     import pandas
 
     from bimnav.plan import Tour
@@ -115,6 +118,19 @@ class SimResult:
             f"SimResult({names}: {len(self.served)} of {len(self.targets)} targets served, "
             f"{self.distance:.2f} m in {self.makespan:.1f} s, {len(self.log)} events)"
         )
+
+    def _repr_html_(self) -> str:
+        """Return a card for a notebook; `to_html` is the replay."""
+        from bimnav._cards import card
+
+        rows = [
+            ("robots", ", ".join(robot.name for robot in self.robots[:9])),
+            ("served", f"{len(self.served)} of {len(self.targets)} targets"),
+            ("driven", f"{self.distance:.1f} m in {self.makespan:.1f} s"),
+            ("energy", f"{self.energy / 3600:.1f} Wh" if self.energy else None),
+            ("events", len(self.log)),
+        ]
+        return card("Simulation", rows)
 
     # --- one robot
 
@@ -271,6 +287,32 @@ class SimResult:
         """Return the GlobalIds of the targets that are still there at a time; what was served is gone."""
         gone = {row.target for row in self.log if row.event == "remove" and row.time <= time}
         return tuple(target for target in self.targets if target not in gone)
+
+    def to_html(self, path: str | PathLike[str] | None = None, *, title: str | None = None) -> str:
+        """Return the replay, a page that shows building and robots in three dimensions, and write it to a file.
+
+        The page is whole in itself: it opens from disk and asks nothing of a network.
+
+        Parameters
+        ----------
+        path
+            File to write; None for none.
+        title
+            The default is the task and the model.
+
+        Raises
+        ------
+        InputError
+            If no history was kept.
+        OutputError
+            If the file cannot be written.
+        """
+        from bimnav.viewer import replay_page
+
+        page = replay_page(self, title=title)
+        if path is not None:
+            write_text(path, page)
+        return page
 
     # --- tables
 
