@@ -83,7 +83,8 @@ def test_no_leg_touches_a_footprint_by_shapely_alone(flat, radius):
 
 def test_a_run_writes_its_figure_tables_and_report(flat, tmp_path):
     mission = bn.run(flat, cell_size=FOOT / 2, out=tmp_path)
-    assert [path.name for path in mission.files] == ["plan.png", "route.csv", "events.csv", "replay.html", "report.json"]
+    names = [path.name for path in mission.files]
+    assert names == ["plan.png", "route.csv", "events.csv", "replay.html", "report.json"]
     with (tmp_path / "route.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == ["x", "y", "storey", "time"]

@@ -42,8 +42,8 @@ __all__ = [
     "draw_names",
     "figure_size",
     "finish",
-    "patches_of",
     "parts_at",
+    "patches_of",
     "shown_box",
     "unit_for",
 ]

@@ -33,8 +33,8 @@ from bimnav.plot._drawing import (
     draw_names,
     figure_size,
     finish,
-    patches_of,
     parts_at,
+    patches_of,
     shown_box,
     unit_for,
 )
