@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.testing import assert_array_equal
 from scipy import ndimage
@@ -21,6 +21,15 @@ from bimnav.testing import box, room
 def test_clearances_are_those_of_scipy_with_a_rim_to_the_last_bit(free):
     for plane, found in zip(free, search.clearances(free), strict=True):
         assert_array_equal(found, ndimage.distance_transform_edt(np.pad(plane, 1))[1:-1, 1:-1])
+
+
+@given(
+    arrays.arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 150))),
+    arrays.arrays(np.bool_, st.sampled_from([(1, 1), (3, 3), (5, 3), (1, 9), (3, 131)])),
+)
+@settings(max_examples=150, deadline=None)
+def test_dilation_is_that_of_scipy(mask, footprint):
+    assert_array_equal(search.dilate(mask, footprint), ndimage.binary_dilation(mask, footprint))
 
 
 def test_a_path_keeps_to_the_middle_of_a_corridor_and_costs_its_length_there():

@@ -253,7 +253,7 @@ def test_a_map_without_free_cells_and_a_map_of_one_cell_are_maps():
 def test_a_heap_that_is_too_small_grows():
     rng = np.random.default_rng(5)
     cost = np.where(rng.random((1, 60, 60)) < 0.75, 1, np.inf).astype(np.float32)
-    heavy = np.where(np.isfinite(cost), 1 + rng.random(cost.shape), np.inf).astype(np.float32)
+    heavy = np.where(np.isfinite(cost), 1 + 1e5 * rng.random(cost.shape), np.inf).astype(np.float32)
     start, goal = np.flatnonzero(np.isfinite(cost))[[0, -1]]
     sources = np.flatnonzero(np.isfinite(cost))[::7]
     space = workspace()

@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from bimnav._start import Start as Start, find_start as find_start
     from bimnav._topology import Topology as Topology, topology as topology
     from bimnav._why import NoRoute as NoRoute, why_unreachable as why_unreachable
+    from bimnav.adaptive import (
+        AdaptiveGraph as AdaptiveGraph,
+        AdaptivePath as AdaptivePath,
+        adaptive_graph as adaptive_graph,
+    )
     from bimnav.assets import Asset as Asset
     from bimnav.building import (
         Building as Building,
@@ -149,6 +154,7 @@ _HOMES = {
     "bimnav._georeference": "Georeference",
     "bimnav._why": "NoRoute why_unreachable",
     "bimnav._oriented": "PosePath find_poses",
+    "bimnav.adaptive": "AdaptiveGraph AdaptivePath adaptive_graph",
     "bimnav._start": "Start find_start",
     "bimnav.ifc._federate": "federate",
     "bimnav.links": "Link RefusedConnector",

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bimnav.environment import IndoorEnvironment
     from bimnav.graph import NavGraph
 
-__all__ = ["Straight", "closed_cells", "straighten", "turns_of"]
+__all__ = ["Straight", "closed_cells", "shorten_points", "straighten", "turns_of"]
 
 Point = tuple[float, float, float]
 
@@ -96,6 +96,20 @@ def _length(points: NDArray[np.float64]) -> float:
     return math.fsum(np.hypot(*np.diff(points, axis=0).T))
 
 
+def shorten_points(graph: NavGraph, storey: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Leave out points of a path on one storey while the straight legs between the others cost less.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        Metres; consecutive ones see each other over free cells.
+    """
+    plan = _without_repeats(points[:, :2])
+    if len(plan) > 1:
+        plan = _Plane.of(graph, storey).shortened(plan).points
+    return np.column_stack([plan, np.full(len(plan), points[0, 2])])
+
+
 def closed_cells(graph: NavGraph, storey: int) -> NDArray[np.bool_]:
     """Return the cells of a storey that were closed after the graph was built, and blocked ones beside them."""
     return _Plane.of(graph, storey).closed_cells()
@@ -132,7 +146,7 @@ class _Plane:
             if dearest <= self.least:  # no way costs less
                 length = _length(found[0])
                 return Straight(found[0], length, length * self.least)
-        return self._shortened(points)
+        return self.shortened(points)
 
     @cached_property
     def least(self) -> float:
@@ -167,7 +181,7 @@ class _Plane:
         found = _without_repeats(np.vstack([points[:first], found, points[last + 1 :]]))
         return found, self._in_cells(found)
 
-    def _shortened(self, points: NDArray[np.float64]) -> Straight:
+    def shortened(self, points: NDArray[np.float64]) -> Straight:
         """Leave out turns where that costs less."""
         cells = self._in_cells(points)
         kept, _ = search.shorten(self.cost, cells)
@@ -241,11 +255,8 @@ class _Plane:
         closed = self._open_at_first() & np.isinf(self.cost)
         if not closed.any():
             return closed
-        from scipy import ndimage
-
-        beside = ndimage.binary_dilation(closed, np.ones((3, 3), dtype=np.bool_))
-        found: NDArray[np.bool_] = closed | (beside & np.isinf(self.cost))
-        return found
+        beside = search.dilate(closed, np.ones((3, 3), dtype=np.bool_))
+        return closed | (beside & np.isinf(self.cost))
 
     def _open_at_first(self) -> NDArray[np.bool_]:
         environment = self.environment

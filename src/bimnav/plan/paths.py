@@ -96,18 +96,18 @@ class Path:
     @cached_property
     def rides(self) -> tuple[tuple[int, Link], ...]:
         """The connectors it takes: each with the number of the cell in `cells` from which it leaves."""
-        return tuple(_rides(self.graph, self.indices))
+        return tuple(_rides(self.graph, self.indices)) if self.graph.connectors else ()
 
     @cached_property
     def points(self) -> NDArray[np.float64]:
         """(m, 3) float64, the middles of the cells and the ways over connectors, world metres."""
-        middles = self.graph.frame.centers_of(self.indices)
-        parts, done = [], 0
-        for k, link in self.rides:
-            inner = link.points_from(Cell(*self.indices[k].tolist()))[1:-1]
-            parts += [middles[done : k + 1], inner]
-            done = k + 1
-        points = np.vstack([*parts, middles[done:]])
+        frame = self.graph.frame
+        points: NDArray[np.float64] = search.centers(
+            self.indices, frame.first_row, frame.first_col, frame.cell_size, np.array(frame.elevations)
+        )
+        if self.rides:
+            parts = np.split(points, [k + 1 for k, _ in self.rides])
+            points = _along(self, parts)
         points.flags.writeable = False
         return points
 

@@ -1,6 +1,7 @@
 """Compiled searches on arrays: nothing here knows a type of bimnav."""
 
 from bimnav.search.components import components
+from bimnav.search.dilation import dilate
 from bimnav.search.engine import Found, distances, distances_between, find
 from bimnav.search.exact import share_out, trace_visits, visit_table
 from bimnav.search.layout import Layout
@@ -10,7 +11,8 @@ from bimnav.search.oriented import HEADINGS, find_motion
 from bimnav.search.repair import Field
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import Taut, find_taut
-from bimnav.search.transform import clearances
+from bimnav.search.trace import centers
+from bimnav.search.transform import clearances, squared_clearances
 from bimnav.search.warmup import warmup
 
 __all__ = [
@@ -22,9 +24,11 @@ __all__ = [
     "Ordering",
     "Taut",
     "along",
+    "centers",
     "clearances",
     "components",
     "dearest",
+    "dilate",
     "distances",
     "distances_between",
     "find",
@@ -38,6 +42,7 @@ __all__ = [
     "order_rows",
     "share_out",
     "shorten",
+    "squared_clearances",
     "trace_visits",
     "visit_table",
     "warmup",

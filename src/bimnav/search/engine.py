@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bimnav.search.astar import astar
 from bimnav.search.compiled import FOUND, FULL
 from bimnav.search.field import spread, unpad
+from bimnav.search.flow import flood
 from bimnav.search.jump import WHOLE, jump
 from bimnav.search.layout import Layout
 from bimnav.search.lengths import FAR, STRAIGHT, to_cells
@@ -69,9 +70,8 @@ def distances(layout: Layout, sources: NDArray[np.int64], scale: float) -> NDArr
         reach = _spread(space, layout, layout.padded(sources), _NONE)
         exact = not len(layout.links[0])
         return unpad(reach, layout.shape, exact, scale * layout.least)  # type: ignore[no-any-return]
-    _astar(space, layout, layout.padded(sources), _NONE, 0.0)
-    nodes = space.costs[: layout.moves.size].reshape(-1, layout.height, layout.stride)[:, 1:-1, 1:-1]
-    return np.where(nodes["stamp"] == space.stamp, nodes["length"] * scale, np.inf)
+    lengths = _costs_from(space, layout, layout.padded(sources))
+    return lengths.reshape(-1, layout.height, layout.stride)[:, 1:-1, 1:-1] * scale
 
 
 def distances_between(layout: Layout, cells: NDArray[np.int64], scale: float) -> NDArray[np.float64]:
@@ -89,13 +89,22 @@ def distances_between(layout: Layout, cells: NDArray[np.int64], scale: float) ->
             found = np.array([to_cells(u) for u in units]) if exact else units / STRAIGHT
             row = np.where(units == FAR, np.inf, found * (scale * layout.least))
         else:
-            _astar(space, layout, cell[None], targets, 0.0)
-            nodes = space.costs[targets]
-            row = np.where(nodes["stamp"] == space.stamp, nodes["length"] * scale, np.inf)
+            row = _costs_from(space, layout, cell[None])[targets] * scale
         matrix[k, ends] = row
         if layout.is_symmetric:
             matrix[ends, k] = row
     return matrix
+
+
+def _costs_from(space: Workspace, layout: Layout, sources: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the cost of every padded cell from the nearest source."""
+    steps = layout.steps[: layout.connectivity]
+    lengths = flood(layout.cost, layout.moves, steps, layout.links, layout.least, layout.greatest, sources)
+    if lengths is None:
+        _astar(space, layout, sources, _NONE, 0.0)
+        nodes = space.costs[: layout.moves.size]
+        lengths = np.where(nodes["stamp"] == space.stamp, nodes["length"], np.inf)
+    return lengths
 
 
 def _jump(space: Workspace, layout: Layout, start: int, goal: int) -> bool:

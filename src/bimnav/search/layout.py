@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bimnav.search.compiled import lean
 
-__all__ = ["COL_STEP", "HUB", "ROW_STEP", "SEES", "Layout", "moves_at"]
+__all__ = ["COL_STEP", "HUB", "ROW_STEP", "SEES", "Layout"]
 
 COL_STEP = (1, 0, -1, 0, 1, -1, -1, 1)
 ROW_STEP = (0, 1, 0, -1, 1, 1, -1, -1)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from bimnav.search.astar import astar
 from bimnav.search.compiled import FOUND, FULL, NEVER, first_at_least, forget, lean, pop_least, push
 from bimnav.search.field import spread, unpad
+from bimnav.search.flow import flood
 from bimnav.search.layout import HUB, Layout, Links, moves_at
 from bimnav.search.lengths import DIAGONAL, FAR, STRAIGHT, to_cells
 from bimnav.search.workspace import workspace
@@ -28,7 +29,7 @@ __all__ = ["Field", "patch", "repair"]
 _NONE = np.zeros(0, dtype=np.int64)
 # The share of the cells that a repair may touch before it gives up: it spends some forty times as long on a cell
 # as a field of equal costs does, and a few times as long as one of others, and giving up must cost little
-_SHARE_UNIFORM, _SHARE_WEIGHTED = 1 / 600, 1 / 40
+_SHARE_UNIFORM, _SHARE_WEIGHTED = 1 / 600, 1 / 150
 _WAITS, _SOURCE = 1, 2
 _UNITS = np.array([STRAIGHT] * 4 + [DIAGONAL] * 4)
 _PLAN = np.array([0.5] * 4 + [0.5 * np.sqrt(2.0)] * 4)
@@ -159,6 +160,13 @@ class Field:
             self._lengths: NDArray[Any] = reach
             return
         steps = layout.steps[: layout.connectivity]
+        finite = self._cost[np.isfinite(self._cost)]
+        if len(finite):
+            bounds = float(finite.min()), float(finite.max())
+            lengths = flood(self._cost, self._moves, steps, self._links, *bounds, self._sources)
+            if lengths is not None:
+                self._lengths = lengths
+                return
 
         def weighted(stamp: int) -> int:
             return int(

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bimnav.search.compiled import lean
 
-__all__ = ["clearances", "transform"]
+__all__ = ["clearances", "squared_clearances", "transform"]
 
 
 def clearances(free: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -24,9 +24,14 @@ def clearances(free: NDArray[np.bool_]) -> NDArray[np.float64]:
     distance : (storeys, rows, cols) float64
         0 where blocked.
     """
+    return np.sqrt(squared_clearances(free))
+
+
+def squared_clearances(free: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Return the squares of `clearances`, whole numbers."""
     squared = np.empty(free.shape, dtype=np.int32)
     transform(np.ascontiguousarray(free), squared, np.empty((3, free.shape[2] + 1), dtype=np.int64))
-    return np.sqrt(squared)
+    return squared
 
 
 @lean

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bimnav.search.components import components
+from bimnav.search.dilation import dilate
 from bimnav.search.engine import distances, distances_between, find
 from bimnav.search.layout import Layout
 from bimnav.search.mesh import mesh_of_mask
@@ -13,6 +14,7 @@ from bimnav.search.oriented import find_motion
 from bimnav.search.repair import Field
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import find_taut
+from bimnav.search.trace import centers
 from bimnav.search.transform import clearances
 
 __all__ = ["warmup"]
@@ -24,6 +26,7 @@ def warmup() -> None:
     cells = np.array([0, 8])
     components(cost > 0)
     clearances(cost > 0)
+    dilate(cost[0] > 0, cost[0] > 0)
     everywhere = np.ones((8, 3, 3), dtype=np.bool_)
     find_motion(everywhere, everywhere, (0, 0, 0), (-1, 2, 2), 1.0, 2.0)
     mesh, face = mesh_of_mask(np.eye(3) < 1)
@@ -34,7 +37,9 @@ def warmup() -> None:
     dearest(cost[0], 0.5, 0.5, 2.5, 2.5)
     for multipliers in (cost, cost + np.arange(3).astype(np.float32)):
         layout = Layout(multipliers)
-        find(layout, 0, 8)
+        found = find(layout, 0, 8)
+        if found:
+            centers(found.indices, 0, 0, 1.0, np.zeros(1))
         distances(layout, cells, 1.0)
         distances_between(layout, cells, 1.0)
         Field(layout, [0]).update([4], np.inf)
