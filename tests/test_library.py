@@ -385,3 +385,11 @@ def test_a_room_is_called_by_its_number_and_its_name():
     house = replace(house, spaces=(replace(house.spaces[0], name="101", long_name="Archive"),))
     (target,) = bn.make_environment(house, bn.load_task("cleaning_rooms")).targets
     assert (target.name, target.label) == ("101 Archive", "storage")
+
+
+def test_a_sprinkler_under_a_slab_is_looked_at_from_below():
+    environment = bn.make_environment(
+        building("fm/BasicFM_wAssembly.ifc"), bn.load_task("inspection_fire"), bn.Robot(radius=0.25)
+    )
+    sprinklers = [target for target in environment.targets if target.label == "sprinkler or other suppression"]
+    assert [target.destination[2] for target in sprinklers] == [0.0, 0.0, 0.0]

@@ -151,6 +151,7 @@ class Zone:
 
 
 _GAP = 0.05  # metres; floors up to twice as far apart, such as a space and a doorway, are one floor
+_FLUSH = 0.05  # metres; what ends so close under a floor lies on it
 _QUARTER = 16  # segments of a quarter circle in a buffer
 
 
@@ -567,10 +568,14 @@ def _found(choice: Choice, environment: IndoorEnvironment) -> Target | None:
     )
 
 
-def _storey_below(environment: IndoorEnvironment, point: BaseGeometry, z: float) -> int:
-    """Return the storey that something at a height stands on: the highest floor below it, under it if any is."""
+def _storey_below(environment: IndoorEnvironment, point: BaseGeometry, z: float, top: float = math.inf) -> int:
+    """Return the storey that something at a height stands on: the highest floor below it, under it if any is.
+
+    What ends below a floor, such as a sprinkler under its slab, does not stand on it.
+    """
     walkable = sorted({region.storey for region in environment.regions}) or [0]
-    below = [s for s in walkable if environment.levels[s] <= z + NEAR] or walkable[:1]
+    highest = min(z + NEAR, top + _FLUSH)
+    below = [s for s in walkable if environment.levels[s] <= highest] or walkable[:1]
     under = [s for s in below if environment.floor(s).intersects(point)]
     return (under or below)[-1]
 
@@ -583,7 +588,7 @@ def _storey_of(environment: IndoorEnvironment, product: Element | Space, point: 
     """
     assert product.bounds is not None  # noqa: S101 - the caller has seen to it
     (low, high), levels = product.bounds[:, 2].tolist(), environment.levels
-    below = _storey_below(environment, point, low)
+    below = _storey_below(environment, point, low, high)
     over = [s for s, level in enumerate(levels) if 0 <= level - high <= UNDER and s != below]
     over = [s for s in over if environment.floor(s).intersects(point)]
     if not over or levels[below] > low:
