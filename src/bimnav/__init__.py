@@ -119,6 +119,7 @@ if TYPE_CHECKING:
         simulate as simulate,
     )
     from bimnav.stops import Stand as Stand, Stop as Stop, Unreached as Unreached
+    from bimnav.study import Study as Study, study as study
     from bimnav.tasks import (
         Overruled as Overruled,
         Rule as Rule,
@@ -173,6 +174,7 @@ _HOMES = {
         "Chance Charger DoorLocks DoorUnlocks Emergency Lift ObstacleAppears ObstacleRemoved Passage Person RobotFails "
         "Sensing SimDoor SimResult SpeedLimit TargetReported ZoneHazardous egress_distances find_passages simulate"
     ),
+    "bimnav.study": "Study study",
     "bimnav.tasks": "Overruled Rule Standoff Task list_tasks load_task",
     "bimnav._topology": "Topology topology",
     "bimnav.verify": "Check check_path check_plan check_poses",

@@ -498,7 +498,9 @@ class RobotAgent:
         line = self.line
         self.arrive(begin, executed, errand)
         if executed.duration > passed:
+            self.under_way = begin, executed
             yield from self.rest(executed.duration - passed)
+            self.under_way = None
         if line is not None:
             pieces = cut_at(line.points, line.storeys, [executed.length])
             self.line = Line(*pieces[-1]) if executed.length > JOINED else line
