@@ -493,11 +493,12 @@ class World:
     def energy_for(self, agent: RobotAgent, errand: Errand) -> float | None:
         """Return the joules that an errand takes, with the way to a charger after it; None without a way."""
         line = errand.leg if errand.leg is not None and self._begins_here(agent, errand.leg) else None
-        if line is None or self.in_way(agent, line) is not None:
+        if line is None:
+            line = errand.leg = self.find_line(agent, errand)
+        elif self.in_way(agent, line) is not None:
             line = self.find_line(agent, errand)
         if line is None:
             return None
-        errand.leg = line
         motion = drive(line.points, line.storeys, agent.robot, heading=agent.heading)
         powers = agent.battery.powers
         joules = motion.duration * powers[RobotStatus.MOVING]
