@@ -18,7 +18,7 @@ from bimnav.sim.areas import cut_at
 from bimnav.sim.energy import Battery
 from bimnav.sim.knowledge import Closure
 from bimnav.sim.log import Event, EventKind
-from bimnav.sim.motion import Motion, drive, rest, stand
+from bimnav.sim.motion import Motion, drive, drive_all, rest, stand
 from bimnav.sim.routes import JOINED, Line, end_of, legs_of
 from bimnav.sim.track import RobotStatus, TrackRecorder
 
@@ -93,6 +93,7 @@ class RobotAgent:
         self.heading: float | None = None
         self.leg_distance = self.distance = self.charge_distance = 0.0
         self.battery = Battery(robot)
+        self.name, self.tires = robot.name, math.isfinite(robot.battery_wh)
         self.recorder = TrackRecorder()
         self.stops: list[Stop] = list(tour.stops)
         self.served: list[str] = []
@@ -107,11 +108,15 @@ class RobotAgent:
         self.line: Line | None = None  # what is left of the way, as it was when the last stretch began
         self.stuck_since: float | None = None
         self.under_way: tuple[float, Motion] | None = None
+        self.is_plain = math.isinf(robot.acceleration) and math.isinf(robot.turn_rate) and world.is_plain
+        self.motions: dict[int, Motion] = {}
         self._take(tour)
         self.process = world.clock.process(self.execute())
 
     def _take(self, tour: Tour) -> None:
         legs = legs_of(tour)
+        if self.is_plain and self.world.setting.speed is None:
+            self.motions = drive_all(legs, self.robot)
         for k, stop in enumerate(tour.stops):
             self.agenda.append(Errand(stop, stop.cell, stop.end, k, legs[k]))
         if len(legs) > len(tour.stops):
@@ -126,36 +131,26 @@ class RobotAgent:
 
     def note(self, event: EventKind, target: Stop | Unreached | None = None, cause: str = "", asset: str = "") -> None:
         """Write an event in the log."""
-        x, y, z = self.here()
-        self.last = now = float(self.world.clock.now)
-        if math.isfinite(self.battery.capacity):
+        world, share = self.world, None
+        x, y, z = self.place if self.under_way is None else self.here()
+        self.last = now = world.clock.now
+        if self.tires:
             self.settle()
-        self.world.write(
-            Event(
-                now,
-                self.robot.name,
-                event,
-                self.status,
-                self.world.storeys[self.storey],
-                x,
-                y,
-                z,
-                target.global_id if target else "",
-                target.name if target else "",
-                cause,
-                self.leg_distance,
-                self.battery.share,
-                asset,
-            )
+            share = self.battery.share
+        of = ("", "") if target is None else (target.global_id, target.name)
+        storey = world.storeys[self.storey]
+        world.write(
+            Event(now, self.name, event, self.status, storey, x, y, z, *of, cause, self.leg_distance, share, asset)
         )
 
     def settle(self) -> None:
         """Draw what the time since the last change of status took from the battery."""
-        now = float(self.world.clock.now)
+        now = self.world.clock.now
         passed = now - self.since
-        self.seconds[self.status] += passed
-        self.battery.spend(self.status, passed)
-        self.since = now
+        if passed:
+            self.seconds[self.status] += passed
+            self.battery.spend(self.status, passed)
+            self.since = now
 
     def become(self, status: RobotStatus) -> None:
         """Change the status, here and now."""
@@ -238,7 +233,7 @@ class RobotAgent:
         """Return what to do next: the next errand, or to charge before it."""
         while self.agenda:
             errand = self.agenda[0]
-            if math.isinf(self.battery.capacity):
+            if not self.tires:
                 return errand
             charging = self.charge_before(errand)
             if charging is None:
@@ -268,7 +263,7 @@ class RobotAgent:
     def go(self, errand: Errand) -> Step:
         """Go where an errand is; answer whether the robot arrived."""
         while not self.orders:
-            if errand.leg is not None and math.dist(errand.leg.points[0], self.place) > JOINED:
+            if errand.leg is not None and math.dist(errand.leg.points[0].tolist(), self.place) > JOINED:
                 errand.leg = None
             obstacle = self.world.in_way(self, errand.leg) if errand.leg is not None else None
             if errand.leg is None or obstacle is not None:
@@ -430,7 +425,7 @@ class RobotAgent:
 
     def run_down(self) -> None:
         """Fail if the battery is empty."""
-        if math.isinf(self.battery.capacity):
+        if not self.tires:
             return
         self.settle()
         if self.battery.level <= self.battery.capacity * 1e-12 and not any(o.kind == "fail" for o in self.orders):
@@ -438,7 +433,7 @@ class RobotAgent:
 
     def move(self, stretch: Stretch, after: list[Stretch], errand: Errand) -> Step:
         """Drive one stretch, and stop for what comes in the way; answer whether its end was reached."""
-        motion = drive(
+        motion = self.motions.get(id(stretch.points)) or drive(
             stretch.points,
             stretch.storeys,
             self.robot,
@@ -487,8 +482,8 @@ class RobotAgent:
         if errand.purpose == "charge" or (errand.stop is not None and errand.stop.kind == "charger"):
             self.charge_distance += motion.length
         x, y, z = motion.points[-1].tolist()
-        self.place, self.storey = (x, y, z), int(motion.storeys[-1])
-        if math.isfinite(self.robot.turn_rate):
+        self.place, self.storey = (x, y, z), motion.storeys.item(-1)
+        if not math.isinf(self.robot.turn_rate):
             facing = _heading(motion.points)
             self.heading = self.heading if facing is None else facing
 
@@ -558,7 +553,7 @@ class RobotAgent:
         short = self.battery.lasts(RobotStatus.WORKING) < seconds
         wait = self.battery.lasts(RobotStatus.WORKING) if short else seconds
         done = not (yield from self.pause(self.world.pass_time(wait))) and not short
-        if not done and not short:
+        if not (done or short):
             done = float(self.world.clock.now) - self.since >= seconds
         self.become(RobotStatus.IDLE)
         self.run_down()

@@ -57,20 +57,30 @@ def legs_of(tour: Tour) -> list[Line]:
         storeys.append(end_of(tour)[0].storey)
     if len(tour.route) != len(ends):
         raise SimulationError(f"a tour of {len(tour.stops)} stops has {len(tour.route)} legs.")
-    legs, here, before = [], tour.start_point, tour.start.storey
-    for k, (polyline, end, after) in enumerate(zip(tour.route, ends, storeys, strict=True)):
-        leg = np.asarray(polyline, dtype=np.float64)
+    lines = [np.asarray(polyline, dtype=np.float64) for polyline in tour.route]
+    for k, leg in enumerate(lines):
         if leg.ndim != 2 or leg.shape[1] != 3 or not len(leg) or not np.isfinite(leg).all():
             raise SimulationError(f"leg {k} of the tour is no polyline of finite points.", "", {"leg": k})
-        gaps = math.dist(here, leg[0]), math.dist(leg[-1], end)
-        if max(gaps) > JOINED:
+    if not lines:
+        return []
+    every = np.concatenate(lines)
+    floor = tour.start.storey
+    is_level = set(storeys) == {floor} and bool(
+        (np.abs(every[:, 2] - tour.graph.frame.elevations[floor]) <= JOINED).all()
+    )
+    level = np.full(max(map(len, lines)), floor, dtype=np.int32)
+    legs, here, before = [], tour.start_point, floor
+    for k, (leg, end, after) in enumerate(zip(lines, ends, storeys, strict=True)):
+        gaps = math.dist(here, leg[0].tolist()), math.dist(leg[-1].tolist(), end)
+        if not max(gaps) <= JOINED:
             raise SimulationError(
                 f"leg {k} of the tour begins {gaps[0]:.6g} m from where the robot is "
                 f"and ends {gaps[1]:.6g} m from where it should stop.",
                 "A route is one unbroken line through the ends of its stops.",
                 {"leg": k},
             )
-        legs.append(Line(leg, _storeys_along(leg, tour.graph.frame, before, after)))
+        on = level[: len(leg)] if is_level else _storeys_along(leg, tour.graph.frame, before, after)
+        legs.append(Line(leg, on))
         here, before = end, after
     return legs
 
