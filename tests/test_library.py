@@ -393,3 +393,11 @@ def test_a_sprinkler_under_a_slab_is_looked_at_from_below():
     )
     sprinklers = [target for target in environment.targets if target.label == "sprinkler or other suppression"]
     assert [target.destination[2] for target in sprinklers] == [0.0, 0.0, 0.0]
+
+
+def test_nearly_every_pipe_of_a_plant_knows_the_valve_that_shuts_it_off():
+    plant = building("mep/b03_heating_with_building_blenderBIM.ifc")
+    pipes = [hit.element for hit in match(bn.load_task("maintenance_leak").targets[0], plant)]
+    ways = [plant.asset(pipe.global_id).find_upstream("valve") for pipe in pipes]
+    assert len(pipes) == 100
+    assert sum(bool(way) and way[-1].ifc_class == "IfcValve" for way in ways) == 98
