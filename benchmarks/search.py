@@ -513,8 +513,8 @@ What each engine is for:
 - `to_rustworkx()` and `to_networkx()` are for algorithms that bimnav does not have.
 - `distance_field` and `distance_matrix` are for many goals at once; `search.Field` keeps a field right while doors
   open and close.
-- `smooth="any_angle"` is exact: no shorter path exists for the robot's middle between those points on that storey,
-  where all floor costs the same.
+- `smooth="any_angle"` is exact on masks: no shorter path exists for a point between those cells where all floor
+  costs the same. Around footprints it is exact but for the chords that stand for arcs, half a percent of the radius.
 
 {table}
 
@@ -523,7 +523,7 @@ are those of the Moving AI Lab, with {queries} of their published queries each, 
 pyastar2d with four neighbors solves an easier problem than bimnav with eight; it is here because it is the fastest
 that one can install. {about}.
 
-![time and memory over cells](../figures/search-growth.png)
+![time and memory over cells](figures/search-growth.png)
 
 Regenerate this page with `python benchmarks/search.py --publish`.
 """
