@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given, settings, strategies as st
 
 from bimnav.errors import GridTooLargeError, OutsideMapError, ValueRangeError
-from bimnav.grid import EROSION, Cell, GridFrame, rasterize
+from bimnav.grid import EROSION, Cell, GridFrame, cells_within, rasterize
 
 SIZES = st.sampled_from([0.05, 0.1, 0.1524, 0.3048, 1.0])
 ORIGINS = st.sampled_from([0.0, -7.3, 15.5448, 114_502.0, 6_269_630.0])
@@ -79,6 +79,57 @@ def test_the_raster_agrees_with_shapely_cell_by_cell(size, origin, seed):
     polygon = shapely.transform(polygon, lambda xy: xy * size + np.floor(origin / size) * size)
     frame = GridFrame.covering((origin, origin, origin + 10 * size, origin + 10 * size), size)
     assert (rasterize(frame, polygon) == oracle(frame, polygon)).all()
+
+
+def some_shape(rng: np.random.Generator) -> shapely.Geometry:
+    x, y = rng.uniform(0, 10, 2)
+    kind = rng.integers(8)
+    if kind == 0:
+        return shapely.box(*np.floor([x, y, x + 2, y + 1]))
+    if kind == 1:
+        return shapely.Point(x, y).buffer(3).difference(shapely.Point(x, y).buffer(1.7))
+    if kind == 2:
+        return shapely.MultiPolygon([shapely.box(x, y, x + 0.1, y + 2), shapely.box(x + 3, y, x + 5, y + 2)])
+    if kind == 3:
+        return shapely.LineString(rng.uniform(0, 10, (3, 2)))
+    if kind == 4:
+        return shapely.Point(x, y)
+    if kind == 5:
+        inner = shapely.GeometryCollection(
+            [shapely.Point(y, x).buffer(1), shapely.LinearRing([(x, y), (y, x), (5, 5)])]
+        )
+        return shapely.GeometryCollection([inner, shapely.Polygon()])
+    if kind == 6:
+        return shapely.Polygon()
+    return shapely.Point(x, y).buffer(2)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 12))
+def test_shapes_of_all_kinds_rasterized_together_occupy_what_each_occupies_alone(seed, count):
+    rng = np.random.default_rng(seed)
+    shapes = [some_shape(rng) for _ in range(count)]
+    frame = GridFrame(0.5, 0, 0, 20, 20)
+    together = np.zeros((20, 20), dtype=bool)
+    for shape in shapes:
+        alone = rasterize(frame, shape)
+        assert (alone == oracle(frame, shape)).all()
+        together |= alone
+    assert (rasterize(frame, shapes) == together).all()
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 2**32 - 1))
+def test_a_cell_lies_within_a_polygon_if_its_eroded_box_does(seed):
+    rng = np.random.default_rng(seed)
+    polygon = shapely.union_all([shape for shape in (some_shape(rng) for _ in range(4)) if shape.area > 0])
+    frame = GridFrame(0.5, 0, 0, 20, 20)
+    within = np.zeros((20, 20), dtype=bool)
+    for row, col in np.ndindex(within.shape):
+        x0, y0, x1, y1 = frame.box_of(Cell(0, row, col))
+        box = shapely.box(x0 + EROSION, y0 + EROSION, x1 - EROSION, y1 - EROSION)
+        within[row, col] = shapely.contains_properly(polygon, box)
+    assert (cells_within(frame, polygon) == within).all()
 
 
 def test_a_wall_that_only_touches_a_cell_does_not_occupy_it():

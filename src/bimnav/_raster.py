@@ -53,23 +53,36 @@ def mark_edges(
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def mark_inside(occupied: NDArray[np.bool_], points: NDArray[np.float64], offsets: NDArray[np.int64]) -> None:
-    """Mark every cell whose middle lies inside one polygon, given by its rings (even-odd).
+def mark_inside(
+    occupied: NDArray[np.bool_], points: NDArray[np.float64], offsets: NDArray[np.int64], groups: NDArray[np.int64]
+) -> None:
+    """Mark every cell whose middle lies inside one of some polygons, each given by its rings (even-odd).
 
-    With the cells of `mark_edges` these are all cells the polygon touches: a cell that meets no edge
-    lies wholly inside or wholly outside.
+    With the cells of `mark_edges` these are all cells the polygons touch: a cell that meets no edge of a
+    polygon lies wholly inside or wholly outside.
 
     Parameters
     ----------
     occupied : (rows, cols) bool, changed in place
     points : (n, 2) float64, cells; closed rings
     offsets : (rings + 1,) int64, where each ring begins in `points`
+    groups : (polygons + 1,) int64, where the rings of each polygon begin
     """
+    for group in range(len(groups) - 1):
+        _mark_inside_one(occupied, points, offsets[groups[group] : groups[group + 1] + 1])
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _mark_inside_one(occupied: NDArray[np.bool_], points: NDArray[np.float64], offsets: NDArray[np.int64]) -> None:
     rows, cols = occupied.shape
-    lowest = min(max(math.ceil(points[:, 1].min() - 0.5), 0), rows)
-    highest = max(min(math.floor(points[:, 1].max() - 0.5), rows - 1), -1)
-    left = min(max(math.ceil(points[:, 0].min() - 0.5), 0), cols)
-    right = max(min(math.floor(points[:, 0].max() - 0.5), cols - 1), -1)
+    x_min, y_min, x_max, y_max = np.inf, np.inf, -np.inf, -np.inf
+    for k in range(offsets[0], offsets[-1]):
+        x_min, x_max = min(x_min, points[k, 0]), max(x_max, points[k, 0])
+        y_min, y_max = min(y_min, points[k, 1]), max(y_max, points[k, 1])
+    lowest = min(max(math.ceil(y_min - 0.5), 0), rows)
+    highest = max(min(math.floor(y_max - 0.5), rows - 1), -1)
+    left = min(max(math.ceil(x_min - 0.5), 0), cols)
+    right = max(min(math.floor(x_max - 0.5), cols - 1), -1)
     if lowest > highest or left > right:
         return
     flips = np.zeros((highest - lowest + 1, right - left + 2), dtype=np.bool_)

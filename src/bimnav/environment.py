@@ -238,10 +238,11 @@ class IndoorEnvironment:
 
     @cached_property
     def _bodies(self) -> tuple[tuple[tuple[Obstacle, BaseGeometry], ...], ...]:
-        return tuple(
-            tuple((o, grown(o.footprint, self.robot.radius)) for o in self.obstacles_on(storey))
-            for storey in range(len(self.levels))
-        )
+        bodies = all_grown([o.footprint for o in self.obstacles], self.robot.radius)
+        levels: list[list[tuple[Obstacle, BaseGeometry]]] = [[] for _ in self.levels]
+        for obstacle, body in zip(self.obstacles, bodies, strict=True):
+            levels[obstacle.storey].append((obstacle, body))
+        return tuple(map(tuple, levels))
 
     @property
     def ground(self) -> int:
@@ -319,9 +320,16 @@ class IndoorEnvironment:
 
 def grown(polygon: BaseGeometry, radius: float) -> BaseGeometry:
     """Return a polygon grown by a radius, never by less: the arcs lie outside the true circles."""
+    return all_grown([polygon], radius)[0]
+
+
+def all_grown(polygons: Sequence[BaseGeometry], radius: float) -> Sequence[BaseGeometry]:
+    """Return polygons grown by a radius, each as by `grown`."""
     if radius == 0:
-        return polygon
-    return shapely.buffer(polygon, radius / math.cos(math.pi / (4 * _QUARTER)), quad_segs=_QUARTER)
+        return polygons
+    enough = radius / math.cos(math.pi / (4 * _QUARTER))
+    bodies: list[BaseGeometry] = shapely.buffer(np.asarray(polygons, dtype=object), enough, quad_segs=_QUARTER).tolist()
+    return bodies
 
 
 def _floor(polygons: Sequence[BaseGeometry], radius: float) -> BaseGeometry:

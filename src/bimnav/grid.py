@@ -259,8 +259,9 @@ def rasterize(frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometry])
     -------
     occupied : (rows, cols) bool
     """
-    touched, inside = _edges_and_insides(frame, polygons)
-    return touched | inside
+    occupied = np.zeros((frame.rows, frame.cols), dtype=np.bool_)
+    _mark(frame, polygons, occupied, occupied)
+    return occupied
 
 
 def cells_within(frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometry]) -> NDArray[np.bool_]:
@@ -279,37 +280,48 @@ def cells_within(frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometr
     -------
     within : (rows, cols) bool
     """
-    touched, inside = _edges_and_insides(frame, polygons)
+    touched, inside = np.zeros((2, frame.rows, frame.cols), dtype=np.bool_)
+    _mark(frame, polygons, touched, inside)
     return inside & ~touched
 
 
-def _edges_and_insides(
-    frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometry]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return the cells whose eroded box meets an edge, and those whose middle lies inside."""
+def _mark(
+    frame: GridFrame,
+    polygons: BaseGeometry | Iterable[BaseGeometry],
+    touched: NDArray[np.bool_],
+    inside: NDArray[np.bool_],
+) -> None:
+    """Mark the cells whose eroded box meets an edge, and those whose middle lies inside."""
     from bimnav._raster import mark_edges, mark_inside
 
-    touched = np.zeros((frame.rows, frame.cols), dtype=np.bool_)
-    inside = np.zeros_like(touched)
-    single = [polygons] if isinstance(polygons, shapely.Geometry) else list(polygons)
-    parts = shapely.get_parts(np.asarray(single, dtype=object))
-    while len(parts) and (shapely.get_type_id(parts) >= 4).any():  # collections inside collections
-        parts = shapely.get_parts(parts)
-    parts = parts[~shapely.is_empty(parts)]
-    if not len(parts):
-        return touched, inside
-    if not np.isfinite(shapely.get_coordinates(parts)).all():
+    runs, groups = _runs_of(_parts_of(polygons))
+    if not len(runs):
+        return
+    points, index = shapely.get_coordinates(runs, return_index=True)
+    if not np.isfinite(points).all():
         raise GridError("a polygon has corners that are not finite.")
-    local = shapely.transform(parts, lambda xy: xy / frame.cell_size - (frame.first_col, frame.first_row))
-    areal = shapely.get_type_id(local) == 3
-    outlines = np.concatenate([shapely.get_rings(local[areal]), local[~areal]])
-    mark_edges(touched, *_runs_of(outlines), EROSION / frame.cell_size)
-    for polygon in local[areal]:
-        mark_inside(inside, *_runs_of(shapely.get_rings([polygon])))
-    return touched, inside
+    points = points / frame.cell_size - (frame.first_col, frame.first_row)
+    offsets = np.searchsorted(index, np.arange(len(runs) + 1)).astype(np.int64)
+    mark_edges(touched, points, offsets, EROSION / frame.cell_size)
+    mark_inside(inside, points, offsets, groups)
 
 
-def _runs_of(lines: NDArray[np.object_]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return the points of rings, lines and points one after the other, and where each begins."""
-    points, index = shapely.get_coordinates(lines, return_index=True)
-    return np.ascontiguousarray(points), np.searchsorted(index, np.arange(len(lines) + 1)).astype(np.int64)
+def _parts_of(polygons: BaseGeometry | Iterable[BaseGeometry]) -> NDArray[np.object_]:
+    """Return polygons, lines and points, none of them empty; those in collections after the others."""
+    single = [polygons] if isinstance(polygons, shapely.Geometry) else list(polygons)
+    parts = np.asarray(single, dtype=object)
+    while (is_collection := shapely.get_type_id(parts) >= 4).any():  # collections inside collections
+        parts = np.concatenate([parts[~is_collection], shapely.get_parts(parts[is_collection])])
+    solid: NDArray[np.object_] = parts[~(shapely.is_empty(parts) | shapely.is_missing(parts))]
+    return solid
+
+
+def _runs_of(parts: NDArray[np.object_]) -> tuple[NDArray[np.object_], NDArray[np.int64]]:
+    """Return all rings, lines and points, rings first, and where the rings of each polygon begin among them."""
+    is_areal = shapely.get_type_id(parts) == 3
+    has_holes = is_areal & (shapely.get_num_interior_rings(parts) > 0)
+    simple = parts[is_areal & ~has_holes]  # its corners are those of its only ring
+    rings, owner = shapely.get_rings(parts[has_holes], return_index=True)
+    starts = np.searchsorted(owner, np.arange(has_holes.sum() + 1))
+    groups = np.concatenate([np.arange(len(simple)), len(simple) + starts])
+    return np.concatenate([simple, rings, parts[~is_areal]]), groups.astype(np.int64)
