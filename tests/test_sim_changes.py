@@ -460,3 +460,31 @@ def test_equal_seeds_give_equal_bytes_in_every_process_ten_of_them_if_full(full)
     for word in (b"sense", b"assign", b"recover", b"charged", b"open_door", b"park", b"hazard"):
         assert word in text
     assert json.loads(text[text.rindex(b"{") :])["makespan"] >= 600
+
+
+def test_a_million_events_leave_memory_flat(full):
+    import tracemalloc
+
+    count = 200_000 if full else 2_000
+    ends = [(10.5, 0.5, 0.0), (0.5, 0.5, 0.0)]
+    ways = [np.array(ends[::-1]), np.array(ends)]
+
+    def peak(stops: int) -> tuple[int, float]:
+        from tests.test_sim import HandMadeTour, stop_at
+
+        visits = tuple(stop_at(ends[k % 2], "s") for k in range(stops))
+        tour = HandMadeTour(tuple(ways[k % 2] for k in range(stops)), visits, ends[1])
+        seen = [0]
+
+        def count_one(_):
+            seen[0] += 1
+
+        tracemalloc.start()
+        simulate(tour, robot=ONE, service_time=1.0, history=False, on_event=count_one)
+        used = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return seen[0], used / stops
+
+    few, many = peak(count // 10), peak(count)
+    assert many[0] >= 4 * count
+    assert many[1] <= 1.2 * few[1]  # what is kept is the plan, not what happens

@@ -319,6 +319,18 @@ def test_an_empty_battery_stops_a_robot_where_it_is():
     assert result.given_up == ("s0",)
 
 
+def test_a_robot_that_waits_too_long_for_a_charger_runs_down_where_it_is():
+    slow = Robot("A", speed=1.0, battery_wh=200 / 3600, drive_power=1.0, charge_power=0.01)
+    idle = Robot("B", speed=1.0, battery_wh=200 / 3600, drive_power=1.0, idle_power=0.5, charge_power=10.0)
+    tours = [tour_in(CORRIDOR, Cell(0, 0, 0), *[Cell(0, 0, c) for c in (60, 20, 90)], prefix=p) for p in "ab"]
+    result = simulate(tours, robots=[slow, idle], chargers=[DOCK], until=4000.0)
+    (failed,) = rows(result, "fail")
+    assert (failed.robot, failed.cause) == ("B", "the battery is empty")
+    for tally in result.tallies:
+        assert tally.level >= 0
+        assert 200 + tally.charged - tally.used == pytest.approx(tally.level, abs=1e-6)
+
+
 def test_two_robots_charge_one_after_the_other():
     tours = [tour_in(CORRIDOR, Cell(0, 0, 0), *[Cell(0, 0, c) for c in (40, 45)], prefix=p) for p in "ab"]
     result = simulate(tours, robot=THIRSTY, service_time=25.0, chargers=[DOCK])

@@ -605,12 +605,10 @@ class RobotAgent:
         granted = self.world.claims.request([name])
         if granted is not None:
             self.halt(RobotStatus.WAITING, "wait", errand, f"{self.world.label_of(name)} is in use")
-            if (yield from self.pause(granted)):
-                self.world.claims.withdraw(granted)
-                self.become(RobotStatus.IDLE)
-                return
+            turned = yield from self.take_turn(granted)
             self.become(RobotStatus.IDLE)
-            self.run_down()
+            if not turned:
+                return
         if (yield from self.go(errand)):
             yield from self.fill(name, None)
         self.world.claims.release([name])
@@ -622,13 +620,23 @@ class RobotAgent:
         granted = self.world.claims.request([stop.global_id])
         if granted is not None:
             self.halt(RobotStatus.WAITING, "wait", errand, f"{self.world.label_of(stop.global_id)} is in use")
-            if (yield from self.pause(granted)):
-                self.world.claims.withdraw(granted)
+            if not (yield from self.take_turn(granted)):
                 return
         yield from self.fill(stop.global_id, stop)
         self.world.claims.release([stop.global_id])
         if not self.orders:
             self.agenda.remove(errand)
+
+    def take_turn(self, granted: simpy.Event) -> Step:
+        """Wait for a charger as long as the battery lasts; answer whether it is free now."""
+        lasting = self.battery.lasts(self.status)
+        event = granted if math.isinf(lasting) else granted | self.world.pass_time(lasting)
+        disturbed = yield from self.pause(event)
+        self.run_down()
+        if not disturbed and granted.triggered and not self.orders:
+            return True
+        self.world.claims.withdraw(granted)
+        return False
 
     def fill(self, name: str, stop: Stop | None) -> Process:
         """Charge until the battery is full, or something is ordered."""

@@ -56,7 +56,7 @@ class Battery:
     def lasts(self, status: RobotStatus) -> float:
         """Return how many seconds it lasts in a status."""
         power = self.powers[status]
-        return self.level / power if power > 0 else math.inf
+        return max(self.level, 0.0) / power if power > 0 else math.inf
 
     def spend(self, status: RobotStatus, seconds: float) -> None:
         """Draw what some seconds in a status take."""
@@ -66,6 +66,7 @@ class Battery:
             self.level += given
             self.charged += given
         elif joules:
+            joules = min(joules, self.level)  # an empty battery gives nothing
             self.level -= joules
             self.used += joules
 
