@@ -3,12 +3,14 @@ PYTHON ?= python3
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-full lint docs figures samples clean
+.PHONY: help demo test test-full lint docs notebooks figures samples clean
 
 help:
 	@echo "make demo       set up .venv and clean the sample apartment; says where the figure is"
 	@echo "make test       set up .venv and run everything CI runs"
 	@echo "make test-full  the same, with the large campaigns whole"
+	@echo "make docs       build the documentation in docs/_build/html"
+	@echo "make notebooks  write notebooks/*.ipynb from their text sources again"
 	@echo "make figures    draw the pictures of README and docs again"
 	@echo "make samples    write the sample models again"
 
@@ -41,6 +43,9 @@ test: lint docs
 
 test-full: lint docs
 	$(BIN)/pytest -n 2 --full
+
+notebooks: .venv/made-dev
+	$(BIN)/python notebooks/pair.py
 
 figures: .venv/made
 	$(BIN)/python docs/make_figures.py

@@ -1,5 +1,7 @@
 """How the documentation is built."""
 
+from pathlib import Path
+
 from bimnav import __version__
 
 project = "bimnav"
@@ -29,3 +31,21 @@ autodoc_member_order = "bysource"
 napoleon_numpy_docstring = True
 napoleon_use_rtype = False
 napoleon_preprocess_types = False
+suppress_warnings = ["ref.python"]  # shapes and units in docstrings, such as `x, y`, are taken for names
+
+
+def _copy_tutorials() -> None:
+    """Copy the text of the notebooks to where Sphinx looks; the build runs them there."""
+    here = Path(__file__).parent
+    folder = here / "tutorials"
+    folder.mkdir(exist_ok=True)
+    sources = {path.name: path for path in (here.parent / "notebooks").glob("*.md")}
+    for path in folder.iterdir():
+        if path.name not in sources:
+            path.unlink()
+    for name, source in sources.items():
+        text = source.read_text(encoding="utf-8").replace("](../docs/", "](../")
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+_copy_tutorials()
