@@ -218,13 +218,27 @@ class NavGraph:
 
     def cost_of(self, link: Link) -> float:
         """Return what a link costs: metres, seconds or joules, by the objective, times its multiplier."""
-        seconds = link.length / self._robot.speed if link.seconds is None else link.seconds
+        seconds = self.seconds_over(link)
         if self.objective == "distance":
             return link.length * link.factor
         if self.objective == "time":
             return seconds * link.factor
         power = self._robot.idle_power if link.kind == "lift" else self._robot.drive_power
         return seconds * power * link.factor
+
+    def seconds_over(self, link: Link, robot: Robot | None = None) -> float:
+        """Return how long a link takes: a lift its own time; a stair or ramp as much longer as a robot is slower.
+
+        Parameters
+        ----------
+        robot
+            None for the one that the graph was made for.
+        """
+        own = self._robot.speed
+        speed = own if robot is None else robot.speed
+        if link.seconds is None:
+            return link.length / speed
+        return link.seconds if link.kind == "lift" else link.seconds * own / speed
 
     @cached_property
     def links(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -12,8 +12,9 @@ from bimnav.errors import InputError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 from bimnav.plan.assignment import Objective, assign_stops
+from bimnav.plan.legs import legs_between
 from bimnav.plan.paths import Algorithm, distance_matrix, free_index
-from bimnav.plan.tours import Tour, near_stands, plan_tour, seconds_at, why_unreached
+from bimnav.plan.tours import Tour, explained, near_stands, plan_tour, seconds_at, why_unreached
 from bimnav.robot import Robot
 from bimnav.stops import Stand, Stop, Unreached
 
@@ -31,9 +32,11 @@ class TeamPlan:
     robots, tours
         One tour for each robot.
     objective
-        What was made least: `total`, the metres of all, or `makespan`, the seconds of the one that takes longest.
+        What was made least: `total`, what the ways of all cost, or `makespan`, the seconds of the one that
+        takes longest.
     lower_bound
-        No assignment of these stops needs less.
+        No assignment of these stops needs less: seconds for `makespan`; for `total` metres, or seconds or
+        joules if that is what the graph's paths make least.
     is_optimal
         Whether no assignment needs less: proved, not hoped.
     unreached
@@ -85,7 +88,8 @@ def plan_tours(
         Their names, speeds, batteries and abilities; None for as many as the environment was made for, with
         numbered names. A stop is served by a robot that has all abilities it asks for.
     objective
-        What to make least: `makespan`, until all are done, or `total`, the metres of all.
+        What to make least: `makespan`, the seconds until all are done, service included, or `total`, what
+        the ways of all cost: metres, or seconds or joules if that is what the graph's paths make least.
     return_to_start, chargers, algorithm
         As in `plan_tour`.
     start_points
@@ -105,7 +109,7 @@ def plan_tours(
         raise InputError(f"there are {len(robots)} robots and {len(starts)} starts.", "Give one start for each robot.")
     unreached: list[Unreached] = []
     if stops is None:
-        stops, lost = graph.stops_from(None)
+        stops, lost = _stops_from(graph, starts)
         unreached += lost
     rows: list[tuple[Stop, Stand]] = []
     groups: list[int] = [-1 - k for k in range(len(starts))]
@@ -119,16 +123,21 @@ def plan_tours(
         served = [(stand, by) for stand, by in served if any(by)]
         if not served:
             lacking = f"no robot has the abilities {', '.join(stop.abilities)}"
-            reason = why_unreached(graph, starts[able.index(True)], stop.cell) if any(able) else lacking
-            unreached.append(Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell))
+            near = starts[able.index(True)] if any(able) else None
+            reason = lacking if near is None else why_unreached(graph, near, stop.cell)
+            left = Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell)
+            unreached += [left] if near is None else explained(graph, near, [left])
         for stand, by in served:
             rows.append((stop, stand))
             groups.append(number)
             for k, may in enumerate(by):
                 allowed[k].append(may)
-    metres = distance_matrix(graph, [*starts, *(stand.cell for _, stand in rows)])
+    cells = [*starts, *(stand.cell for _, stand in rows)]
+    cost = distance_matrix(graph, cells)
     service = np.array([0.0] * len(starts) + [seconds_at(graph, stop) for stop, _ in rows])
-    costs = [metres if objective == "total" else metres / robot.speed + service for robot in robots]
+    costs = [
+        cost if objective == "total" else legs_between(graph, cells, cost, robot).seconds + service for robot in robots
+    ]
     shares = assign_stops(
         costs,
         range(len(starts)),
@@ -154,3 +163,21 @@ def plan_tours(
         )
     unreached += [lost for tour in tours for lost in tour.unreached]
     return TeamPlan(tuple(robots), tuple(tours), objective, shares.bound, shares.is_optimal, tuple(unreached))
+
+
+def _stops_from(graph: NavGraph, starts: Sequence[Cell]) -> tuple[tuple[Stop, ...], list[Unreached]]:
+    """Return where robots serve the targets, from whichever start they come, and what none of them can serve."""
+    found: dict[str, Stop] = {}
+    lost: dict[str, Unreached] = {}
+    for start in {int(graph.components[start]): start for start in reversed(starts)}.values():
+        stops, missing = graph.stops_from(start)
+        for stop in stops:
+            known = found.get(stop.global_id, stop)
+            found[stop.global_id] = replace(known, candidates=tuple(dict.fromkeys(known.candidates + stop.candidates)))
+        for left in explained(graph, start, missing):
+            lost[left.global_id] = left
+    order = [target.global_id for target, _ in graph.targets]
+    return (
+        tuple(found[global_id] for global_id in order if global_id in found),
+        [lost[global_id] for global_id in order if global_id in lost and global_id not in found],
+    )

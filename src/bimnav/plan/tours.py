@@ -17,6 +17,7 @@ from bimnav.errors import InputError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 from bimnav.plan.charging import Charge, plan_charging
+from bimnav.plan.legs import legs_between
 from bimnav.plan.orders import gap_of, order_stops
 from bimnav.plan.paths import (
     Algorithm,
@@ -38,6 +39,7 @@ Point: TypeAlias = tuple[float, float, float]
 
 _SAME_POINT = 1e-9  # metres
 _FARTHER = 0.5  # metres from its target that a place may be beyond the nearest, if it shortens the tour
+_ROUNDING = 1e-9  # relative
 _DOCK = 3.0  # metres from a dock at which a robot charges
 
 
@@ -58,9 +60,10 @@ class Tour:
     unreached
         What cannot be served, and why.
     is_optimal
-        Whether no order of these stops costs less: proved, not hoped.
+        Whether no order of these stops that keeps priorities and deadlines costs less: proved, not hoped.
     lower_bound
-        No order of these stops costs less than this, metres.
+        No such order costs less than this: metres, or seconds or joules if that is what the graph's
+        paths make least. It is that of the paths over cells, also where legs were drawn straight.
     return_to_start
         Whether the tour ends where it begins.
     end
@@ -95,7 +98,8 @@ class Tour:
             areas += [(obstacle.footprint, "#6b6459") for obstacle in environment.obstacles_on(storey)]
         level = self.graph.frame.elevations[storey]
         lines = [(leg, "#0072b2") for leg in self.route if len(leg) > 1 and (abs(leg[:, 2] - level) < 1e-6).all()]
-        proved = "proved shortest" if self.is_optimal else f"at most {self.gap:.1%} above the shortest"
+        best = {"distance": "shortest", "time": "fastest", "energy": "thriftiest"}[self.graph.objective]
+        proved = f"proved {best}" if self.is_optimal else f"at most {self.gap:.1%} above the {best}"
         rows = [
             ("length", f"{self.length:.2f} m, {proved}"),
             ("stops", ", ".join(stop.name for stop in self.stops)),
@@ -111,12 +115,12 @@ class Tour:
 
     @cached_property
     def cost(self) -> float:
-        """Of all legs, metres; the length where no cell has a multiplier."""
+        """Of all legs, what the graph's paths make least: metres, seconds or joules, times multipliers."""
         return math.fsum(leg.cost for leg in self.legs)
 
     @property
     def gap(self) -> float:
-        """How much the tour costs beyond the lower bound, as a fraction of it."""
+        """How much the tour costs beyond the lower bound, as a fraction of it, whatever the objective."""
         return gap_of(self.cost, self.lower_bound)
 
     @property
@@ -164,7 +168,8 @@ def plan_tour(
 
     Of a stop that can be served from several places the best for the tour is taken, none more than half a
     metre farther from its target than the nearest. Stops of higher priority are served first. Where stops
-    are due, those that cannot be done in time are left out, those of low priority first.
+    are due, the order is one that takes little time, on the graph's cheapest paths and in service; those that
+    cannot be done in time are left out, those of low priority first.
 
     Parameters
     ----------
@@ -304,10 +309,11 @@ def _ordered(
         group += [number] * len(places)
         columns += [(priority, due, sum(seconds_at(graph, stop) for stop in stops))] * len(places)
     priority, due, service = np.array(columns).T
-    metres = distance_matrix(graph, cells)
+    cost = distance_matrix(graph, cells)
     is_timed = bool(np.isfinite(due).any())
+    spent = legs_between(graph, cells, cost, robot).seconds if is_timed else cost
     order = order_stops(
-        metres / robot.speed if is_timed else metres,
+        spent,
         end=None if end is None else 1,
         return_to_start=return_to_start,
         groups=group,
@@ -323,10 +329,24 @@ def _ordered(
             stand = next(stand for stand in stop.candidates if stand.cell == cells[row])
             visits.append(stop.at(stand))
     late = tuple(stop for row in order.left_out for stop in found[group[row] - first][1])
-    bound = order.bound
-    if is_timed:
-        bound = max(bound - math.fsum(service[visited]), 0.0) * robot.speed
-    return _Ordered(tuple(visits), late, bound, order.is_optimal)
+    if not is_timed:
+        return _Ordered(tuple(visits), late, order.bound, order.is_optimal)
+    apart = np.isfinite(spent) & (spent > 0)
+    rate = (cost[apart] / spent[apart]).tolist() or [1.0]
+    if max(rate) - min(rate) <= _ROUNDING * max(rate):  # what takes least time costs least
+        bound = max(order.bound - math.fsum(service[visited]), 0.0) * min(rate)
+        return _Ordered(tuple(visits), late, bound, order.is_optimal)
+    done = {group[row] for row in visited}
+    rows = [row for row in range(len(cells)) if row < first or group[row] in done]
+    bound = order_stops(
+        cost[np.ix_(rows, rows)],
+        end=None if end is None else 1,
+        return_to_start=return_to_start,
+        groups=np.array(group)[rows],
+    ).bound
+    along = [*order.order, *([0] if return_to_start else [])]
+    is_optimal = math.fsum(cost[along[:-1], along[1:]].tolist()) <= bound * (1 + _ROUNDING)
+    return _Ordered(tuple(visits), late, bound, is_optimal)
 
 
 def seconds_at(graph: NavGraph, stop: Stop) -> float:
@@ -377,7 +397,8 @@ def _charged(
     for count in range(len(visits), -1, -1):  # the most stops after which it still gets where it should end
         cells = [start, *(stop.cell for stop in visits[:count]), *([] if goal is None else [goal])]
         n = len(cells)
-        metres = distance_matrix(graph, [*cells, *(charger.cell for charger in chargers)])
+        places = [*cells, *(charger.cell for charger in chargers)]
+        metres = legs_between(graph, places, distance_matrix(graph, places), robot).metres
         service = [seconds_at(graph, stop) for stop in visits[:count]] + [0.0] * (n - 1 - count)
         back = np.roll(metres[n:, :n], -1, axis=1)  # column k leads to stop k
         found = plan_charging(robot, np.diagonal(metres, 1)[: n - 1], service, metres[:n, n:].T, back)

@@ -1,0 +1,55 @@
+"""How long the ways between cells are, in metres and in seconds, whatever they make least."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bimnav.plan.paths import find_path
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bimnav.graph import NavGraph
+    from bimnav.grid import Cell
+    from bimnav.robot import Robot
+
+__all__ = ["Legs", "legs_between"]
+
+
+class Legs(NamedTuple):
+    """Of the cheapest paths between cells, from row to column: (n, n) metres, and (n, n) seconds; inf for none."""
+
+    metres: NDArray[np.float64]
+    seconds: NDArray[np.float64]
+
+
+def legs_between(graph: NavGraph, cells: Sequence[Cell], cost: NDArray[np.float64], robot: Robot) -> Legs:
+    """Measure the cheapest paths between cells.
+
+    Where floor costs the same everywhere and no connector leads away, lengths follow from costs; else every
+    path is looked at.
+
+    Parameters
+    ----------
+    cost : (n, n)
+        As `distance_matrix` returns it for these cells.
+    robot
+        Whose speed counts.
+    """
+    if not graph.connectors and not (graph.cost[graph.free] != 1).any():
+        metres = cost / graph.unit_cost
+        return Legs(metres, metres / robot.speed)
+    metres, seconds = np.full(cost.shape, np.inf), np.full(cost.shape, np.inf)
+    np.fill_diagonal(metres, 0.0)
+    np.fill_diagonal(seconds, 0.0)
+    for a, b in np.argwhere(np.isfinite(cost)).tolist():
+        if a != b:
+            path = find_path(graph, cells[a], cells[b])
+            metres[a, b] = path.length
+            on_links = sum(link.length for _, link in path.rides)
+            seconds[a, b] = (path.length - on_links) / robot.speed
+            seconds[a, b] += sum(graph.seconds_over(link, robot) for _, link in path.rides)
+    return Legs(metres, seconds)
