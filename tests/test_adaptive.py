@@ -105,3 +105,10 @@ def test_cells_that_are_none_or_blocked_are_refused():
         adaptive.find_path(Cell(0, 1, 1), Cell(0, 0, 0))
     with pytest.raises(OutsideMapError):
         adaptive.find_path(Cell(0, 1, 1), Cell(0, 9, 0))
+
+
+def test_build_graph_makes_an_adaptive_graph_when_asked():
+    environment = bn.make_environment(bn.read_ifc(bn.sample("apartment")), bn.load_task("cleaning"))
+    adaptive = bn.build_graph(environment, cell_size=0.1, connectivity=8, adaptive=True)
+    assert isinstance(adaptive, bn.AdaptiveGraph)
+    assert adaptive.node_count < adaptive.graph.free.sum() / 2

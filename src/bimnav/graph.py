@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from bimnav._explain import CellExplanation
+    from bimnav.adaptive import AdaptiveGraph
     from bimnav.environment import IndoorEnvironment, Target
 
 __all__ = ["Conflict", "NavGraph", "NodeKind", "Objective", "Stop", "Unreached", "build_graph"]
@@ -567,6 +568,34 @@ def _owned(array: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
     return _frozen(np.array(array, dtype=dtype))
 
 
+@overload
+def build_graph(
+    environment: IndoorEnvironment,
+    *,
+    cell_size: float = ...,
+    connectivity: Literal[4, 8] = ...,
+    refine: Literal["auto"] | None = ...,
+    on_conflict: Literal["approach", "reach"] = ...,
+    objective: Objective = ...,
+    clearance: float = ...,
+    adaptive: Literal[False] = ...,
+) -> NavGraph: ...
+
+
+@overload
+def build_graph(
+    environment: IndoorEnvironment,
+    *,
+    cell_size: float = ...,
+    connectivity: Literal[4, 8] = ...,
+    refine: Literal["auto"] | None = ...,
+    on_conflict: Literal["approach", "reach"] = ...,
+    objective: Objective = ...,
+    clearance: float = ...,
+    adaptive: Literal[True],
+) -> AdaptiveGraph: ...
+
+
 def build_graph(
     environment: IndoorEnvironment,
     *,
@@ -576,7 +605,8 @@ def build_graph(
     on_conflict: Literal["approach", "reach"] = "approach",
     objective: Objective = "distance",
     clearance: float = 0.0,
-) -> NavGraph:
+    adaptive: bool = False,
+) -> NavGraph | AdaptiveGraph:
     """Cut an environment into cells, and join its storeys by the connectors its robot can use.
 
     Parameters
@@ -596,6 +626,9 @@ def build_graph(
         What paths make least: `distance`, `time` or `energy`.
     clearance
         Distance from obstacles that paths prefer, metres, beyond the robot's radius; `with_clearance`.
+    adaptive
+        Whether to join cells in open space to larger squares: an explicit graph of far fewer nodes, see
+        `AdaptiveGraph`. Its `graph` is the fine one.
 
     Raises
     ------
@@ -619,4 +652,10 @@ def build_graph(
         frame, cost, obstacle, floor, connectivity, environment, targets, conflicts, on_conflict, connectors, refused,
         objective,
     )  # fmt: skip
-    return graph.with_clearance(clearance) if clearance else graph
+    if clearance:
+        graph = graph.with_clearance(clearance)
+    if adaptive:
+        from bimnav.adaptive import adaptive_graph
+
+        return adaptive_graph(graph)
+    return graph
