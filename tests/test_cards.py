@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import pytest
@@ -40,3 +41,34 @@ def test_the_card_of_a_building_counts_what_is_in_it(shown):
     card = shown["building"]._repr_html_()
     assert re.search(r"\d+ Wall", card)
     assert "IFC4" in card
+
+
+def test_the_card_of_a_team_says_who_does_what_and_that_of_a_study_what_was_tried(shown):
+    graph = shown["graph"]
+    start = bn.find_start(graph)
+    team = bn.plan_tours(graph, [start.cell, start.cell])._repr_html_()
+    ElementTree.fromstring(team)
+    assert re.search(r"R1</td>.*stops, [\d.]+ m</td>", team)
+    assert "makespan, proved best" in team
+    told = []
+    found = bn.study(
+        shown["environment"], starts=[start.point[:2]], speeds=[0.5, 1.0], progress=lambda *beat: told.append(beat)
+    )
+    ElementTree.fromstring(card := found._repr_html_())
+    assert "2 of 2" in card
+    assert "0.5; 1.0" in card
+    assert told == [(0, 2, "scenarios"), (2, 2, "scenarios")]
+
+
+def test_the_replay_shows_inside_a_notebook_as_text_that_stays_in_its_frame(shown):
+    pytest.importorskip("IPython", reason="IPython is not installed: pip install ipython")
+    result = bn.simulate(shown["tour"], service_time=5.0)
+    markup = result.show(height=321).data
+    frames = []
+    reader = HTMLParser()
+    reader.handle_starttag = lambda tag, attributes: frames.append((tag, dict(attributes)))
+    reader.feed(markup)
+    assert [tag for tag, _ in frames] == ["div", "iframe"]
+    frame = frames[1][1]
+    assert frame["srcdoc"] == result.to_html()
+    assert (frame["sandbox"], frame["height"]) == ("allow-scripts", "321")

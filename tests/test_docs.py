@@ -30,3 +30,8 @@ def test_the_readme_prints_what_it_says(capsys):
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_in_docstrings_hold(name):
     assert doctest.testmod(importlib.import_module(name)).failed == 0
+
+
+def test_no_public_name_is_also_a_module_which_would_take_its_place_once_imported():
+    modules = {name.rpartition(".")[2] for name in MODULES if name.count(".") == 1}
+    assert not modules & set(bimnav.__all__)

@@ -7,12 +7,14 @@ import math
 import pickle
 
 import pytest
+from matplotlib.collections import PathCollection
 
+from bimnav._study import Study, _jobs, study
 from bimnav.environment import make_environment
 from bimnav.errors import InputError, ValueRangeError
+from bimnav.plot import plot_study
 from bimnav.robot import Robot
 from bimnav.sim import Chance
-from bimnav.study import Study, _jobs, study
 from bimnav.tasks import Task
 from bimnav.testing import two_rooms
 
@@ -91,7 +93,7 @@ def test_a_study_that_was_cut_short_goes_on(tmp_path, monkeypatch):
     file = tmp_path / "rows.jsonl"
     half = study(environment(), starts=GRID["starts"][:1], cell_sizes=GRID["cell_sizes"], file=file)
     played = []
-    import bimnav.study as module
+    import bimnav._study as module
 
     original = module._played
     monkeypatch.setattr(module, "_played", lambda job, row: played.append(row) or original(job, row))
@@ -132,3 +134,16 @@ def test_a_grid_with_nothing_in_it_is_refused(bad):
 def test_a_backend_that_is_none_is_refused():
     with pytest.raises(ValueRangeError, match="'carrier pigeon'"):
         study(environment(), **GRID, backend="carrier pigeon")
+
+
+def test_the_figure_of_a_study_has_a_dot_for_every_scenario_and_a_color_for_every_group():
+    from matplotlib.figure import Figure
+
+    found = study(environment(), **GRID, speeds=[0.5, 1.0])
+    ax = plot_study(found, "makespan", "speed", "start", ax=Figure().subplots())
+    assert sum(len(dots.get_offsets()) for dots in ax.collections if isinstance(dots, PathCollection)) == len(found)
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["1 1", "7 1"]
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["0.5", "1"]
+    assert ax.get_xlabel() == "speed (m/s)"
+    with pytest.raises(ValueRangeError, match="no summary"):
+        plot_study(found, "colour", ax=ax)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from bimnav._georeference import Georeference as Georeference
     from bimnav._oriented import PosePath as PosePath, find_poses as find_poses
     from bimnav._start import Start as Start, find_start as find_start
+    from bimnav._study import Study as Study, study as study
     from bimnav._topology import Topology as Topology, topology as topology
     from bimnav._why import NoRoute as NoRoute, why_unreachable as why_unreachable
     from bimnav.adaptive import (
@@ -82,6 +83,7 @@ if TYPE_CHECKING:
         plot_field as plot_field,
         plot_fleet as plot_fleet,
         plot_graph as plot_graph,
+        plot_study as plot_study,
         plot_timeline as plot_timeline,
         plot_tour as plot_tour,
     )
@@ -119,7 +121,6 @@ if TYPE_CHECKING:
         simulate as simulate,
     )
     from bimnav.stops import Stand as Stand, Stop as Stop, Unreached as Unreached
-    from bimnav.study import Study as Study, study as study
     from bimnav.tasks import (
         Overruled as Overruled,
         Rule as Rule,
@@ -164,7 +165,9 @@ _HOMES = {
         "Assignment Charge Path StopOrder TeamPlan Tour assign_stops distance_field distance_matrix find_path "
         "order_stops plan_tour plan_tours"
     ),
-    "bimnav.plot": ("animate plot_building plot_environment plot_field plot_fleet plot_graph plot_timeline plot_tour"),
+    "bimnav.plot": (
+        "animate plot_building plot_environment plot_field plot_fleet plot_graph plot_study plot_timeline plot_tour"
+    ),
     "bimnav.readiness": "DoorCheck Readiness RoomCheck StoreyCheck doors_of",
     "bimnav.replan": "Replan Replanner",
     "bimnav.robot": "Robot",
@@ -174,7 +177,7 @@ _HOMES = {
         "Chance Charger DoorLocks DoorUnlocks Emergency Lift ObstacleAppears ObstacleRemoved Passage Person RobotFails "
         "Sensing SimDoor SimResult SpeedLimit TargetReported ZoneHazardous egress_distances find_passages simulate"
     ),
-    "bimnav.study": "Study study",
+    "bimnav._study": "Study study",
     "bimnav.tasks": "Overruled Rule Standoff Task list_tasks load_task",
     "bimnav._topology": "Topology topology",
     "bimnav.verify": "Check check_path check_plan check_poses",

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["card", "counted", "plan_svg"]
+__all__ = ["ROBOTS", "card", "counted", "plan_svg"]
+
+ROBOTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f3c8d", "#5d6d1e")  # one after the other
 
 _SIDE = 200.0  # pixels of the longer side of a plan
 _STYLE = "border:1px solid #ddd8cf;border-radius:6px;padding:.5em .9em;display:inline-flex;gap:1.2em;max-width:52em"

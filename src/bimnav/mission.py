@@ -23,7 +23,7 @@ from bimnav.graph import NavGraph, build_graph
 from bimnav.robot import Robot
 
 if TYPE_CHECKING:
-    from bimnav.ifc import Progress
+    from bimnav._progress import Progress
     from bimnav.plan import Tour
     from bimnav.sim import SimResult
     from bimnav.tasks import Task

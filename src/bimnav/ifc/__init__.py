@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
-import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bimnav._progress import Display, Progress
 from bimnav.errors import CacheError, InputError
 
 if TYPE_CHECKING:
@@ -25,12 +25,6 @@ if TYPE_CHECKING:
 __all__ = ["cache_info", "clear_cache", "read_ifc"]
 
 _LOG = logging.getLogger(__name__)
-
-_PATIENCE = 2.0  # seconds before progress shows by itself
-_REFRESH = 0.1
-_WIDTH = 79
-
-Progress = Callable[[int, int, str], None]
 
 
 def read_ifc(
@@ -62,7 +56,7 @@ def read_ifc(
         `timeout` and `memory` do not hold.
     progress
         Whether to show on standard error how far the reading is, or a function to call with products
-        done, their total, and what is being worked on. None shows it on a terminal if it takes long.
+        done, their total, and what is being worked on. None shows it on a terminal, or in a notebook, if it takes long.
     timeout
         Seconds after which to give up; half an hour if not given.
     memory
@@ -102,7 +96,7 @@ def _building_of(
     from bimnav.ifc._model import to_building
     from bimnav.ifc._select import selector_for
 
-    with _Display(path.name, progress) as report:
+    with Display(path.name, progress) as report:
         model = _model_of(path, sha256, cache, limits, report)
     selector = selector_for(path, sha256, model)
     return to_building(
@@ -171,33 +165,3 @@ def _read(path: Path, sha256: str, limits: Limits | None, report: Progress) -> R
     if digest(path) != sha256:
         raise InputError(f"{path.name} changed while it was read.", "Read it again.", {"path": str(path)})
     return reading
-
-
-def _on_terminal() -> bool:
-    return sys.stderr is not None and sys.stderr.isatty()
-
-
-class _Display:
-    """Shows how far a reading is: on standard error, or through the caller's function."""
-
-    def __init__(self, name: str, wanted: bool | Progress | None) -> None:
-        self._name = name
-        self._call = wanted if callable(wanted) else None
-        self._shows = _on_terminal() if wanted is None else wanted is True
-        self._next = time.monotonic() + (_PATIENCE if wanted is None else 0.0)
-        self._shown = False
-
-    def __enter__(self) -> Progress:
-        return self._call or self._show
-
-    def __exit__(self, *_: object) -> None:
-        if self._shown:
-            sys.stderr.write(f"\r{'':{_WIDTH}}\r")
-
-    def _show(self, done: int, total: int, text: str) -> None:
-        now = time.monotonic()
-        if self._shows and now >= self._next:
-            self._next, self._shown = now + _REFRESH, True
-            count = f"{done}/{total} " if total else ""
-            sys.stderr.write(f"\r{f'{self._name}: {count}{text}'[:_WIDTH]:{_WIDTH}}")
-            sys.stderr.flush()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,33 @@ class TeamPlan:
     def __repr__(self) -> str:
         counts = ", ".join(f"{r.name} {len(t.stops)}" for r, t in zip(self.robots, self.tours, strict=True))
         return f"TeamPlan({counts} stops, {len(self.unreached)} unreached, {self.length:.3f} m)"
+
+    def _repr_html_(self) -> str:
+        """Return a card for a notebook; the plan shows the storey on which the first robot starts."""
+        from bimnav._cards import ROBOTS, card, plan_svg
+
+        graph, storey = self.tours[0].graph, self.tours[0].start.storey
+        environment, level = graph.environment, graph.frame.elevations[storey]
+        areas: list[tuple[Any, str]] = []
+        if environment is not None:
+            areas += [(region.polygon, "#e6e0d5") for region in environment.regions if region.storey == storey]
+            areas += [(obstacle.footprint, "#6b6459") for obstacle in environment.obstacles_on(storey)]
+        lines = [
+            (leg, ROBOTS[k % len(ROBOTS)])
+            for k, tour in enumerate(self.tours)
+            for leg in tour.route
+            if len(leg) > 1 and (abs(leg[:, 2] - level) < 1e-6).all()
+        ]
+        proved = "proved best" if self.is_optimal else f"at least {self.lower_bound:.1f} is needed"
+        rows = [
+            (robot.name, f"{len(tour.stops)} stops, {tour.length:.2f} m")
+            for robot, tour in zip(self.robots, self.tours, strict=True)
+        ]
+        rows += [
+            ("objective", f"{self.objective}, {proved}"),
+            ("not reached", ", ".join(f"{lost.name}: {lost.reason}" for lost in self.unreached)),
+        ]
+        return card(f"Plan of {len(self.robots)} robots", rows, plan_svg(areas, lines))
 
     @property
     def length(self) -> float:

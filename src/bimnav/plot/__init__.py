@@ -1,4 +1,4 @@
-"""Figures: a building, an environment, a grid, tours, fields and time. Each draws on an axes and returns it."""
+"""Figures: a building, an environment, a grid, tours, fields, studies, time. Each draws on an axes and returns it."""
 
 from bimnav.plot._plans import (
     figure_bytes,
@@ -10,6 +10,7 @@ from bimnav.plot._plans import (
     plot_tour,
     save_tour,
 )
+from bimnav.plot._study import plot_study
 from bimnav.plot._time import animate, plot_timeline
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "plot_field",
     "plot_fleet",
     "plot_graph",
+    "plot_study",
     "plot_timeline",
     "plot_tour",
     "save_tour",

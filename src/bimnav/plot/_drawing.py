@@ -15,6 +15,7 @@ from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
+from bimnav._cards import ROBOTS
 from bimnav.errors import ValueRangeError
 from bimnav.graph import NavGraph, NodeKind
 
@@ -50,7 +51,6 @@ __all__ = [
 
 Unit = Literal["m", "ft"]
 
-ROBOTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f3c8d", "#5d6d1e")  # one after the other
 STATUSES = {
     "moving": "#0072b2",
     "working": "#009e73",

@@ -314,6 +314,42 @@ class SimResult:
             write_text(path, page)
         return page
 
+    def show(self, *, height: int = 600) -> Any:
+        """Return the replay as something that a notebook displays.
+
+        The page is whole in the notebook; it can be as large as the building asks for, some megabytes.
+
+        Parameters
+        ----------
+        height
+            Of the frame, pixels.
+
+        Returns
+        -------
+        display : IPython.display.HTML
+            To be the last value of a cell.
+
+        Raises
+        ------
+        MissingExtraError
+            If IPython is not installed, outside of notebooks.
+        InputError
+            If no history was kept.
+        """
+        import html
+
+        try:
+            from IPython import display
+        except ImportError as error:
+            raise MissingExtraError("show needs IPython.", "Call it in a notebook, or write to_html.") from error
+        page = html.escape(self.to_html(), quote=True)
+        style = "width:100%;border:1px solid #ddd8cf;border-radius:6px"
+        # the frame has an origin of its own: what is in the page cannot touch the notebook
+        frame = (
+            f'<iframe srcdoc="{page}" sandbox="allow-scripts" title="replay" height="{int(height)}" style="{style}">'
+        )
+        return display.HTML(f"<div>{frame}</iframe></div>")  # type: ignore[no-untyped-call]
+
     # --- tables
 
     def trajectory(self, step: float | None = None, robot: str | None = None) -> NDArray[Any]:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from bimnav._files import write_text
+from bimnav._progress import Display, Progress
 from bimnav.environment import IndoorEnvironment, Place
 from bimnav.errors import BimnavError, InputError, MissingExtraError, ValueRangeError
 from bimnav.graph import NavGraph, build_graph
@@ -78,6 +79,24 @@ class Study:
     def __repr__(self) -> str:
         failed = sum(bool(row["error"]) for row in self.rows)
         return f"Study({len(self)} scenarios, {failed} not played)"
+
+    def _repr_html_(self) -> str:
+        """Return a card for a notebook."""
+        from bimnav._cards import card, counted
+
+        played = [row for row in self.rows if not row["error"]]
+        rows: list[tuple[str, Any]] = [("played", f"{len(played)} of {len(self)}")]
+        for name in _SETTINGS:
+            values = list(dict.fromkeys(row[name] for row in self.rows))
+            if len(values) > 1:
+                more = f" and {len(values) - 6} others" if len(values) > 6 else ""
+                rows.append((name.replace("_", " "), "; ".join(str(value) or "none" for value in values[:6]) + more))
+        for name, unit in (("length", "m"), ("makespan", "s"), ("waiting", "s"), ("conflicts", "")):
+            found = [row[name] for row in played]
+            if found:
+                rows.append((name, f"{min(found):.4g} to {max(found):.4g} {unit}".rstrip()))
+        rows.append(("not played", counted(row["error"] for row in self.rows if row["error"])))
+        return card(f"Study of {len(self)} scenarios", rows)
 
     def summary(self, result: str, by: Sequence[str] = _SETTINGS[:-1], *, confidence: float = 0.95) -> list[Row]:
         """Sum up one result over scenarios that share some settings, such as all seeds of each.
@@ -170,6 +189,7 @@ def study(
     backend: Backend = "serial",
     workers: int = 2,
     file: str | PathLike[str] | None = None,
+    progress: bool | Progress | None = None,
 ) -> Study:
     """Plan and play every combination of settings in one building.
 
@@ -201,6 +221,9 @@ def study(
     file
         Where finished rows are kept, one JSON object a line; a study that was cut short goes on from there.
         The file is always whole: it is written anew, then put in its place.
+    progress
+        As in `read_ifc`: whether to show how far the study is, or a function to call with scenarios done,
+        their total, and a word.
 
     Returns
     -------
@@ -238,14 +261,17 @@ def study(
     places = {" ".join(str(value) for value in start): start for start in lists["start"]}
     doors = {" ".join(names): names for names in lists["closed_doors"]}
     missing = [row for row in grid if _key(row) not in done]
-    for batch in _batches(missing, 1 if backend == "serial" else workers * _BATCHES):
-        jobs = _jobs(environment, batch, places, doors, connectivity, dict(options or {}))
-        for rows in _play_all([job for job in jobs if isinstance(job, _Job)], backend, workers):
-            done |= {_key(row): row for row in rows}
-        done |= {_key(row): row for row in jobs if isinstance(row, dict)}
-        if file is not None:
-            lines = [json.dumps(done[_key(row)], allow_nan=False) for row in grid if _key(row) in done]
-            write_text(Path(file), "".join(f"{line}\n" for line in lines))
+    with Display("study", progress) as report:
+        report(len(grid) - len(missing), len(grid), "scenarios")
+        for batch in _batches(missing, 1 if backend == "serial" else workers * _BATCHES):
+            jobs = _jobs(environment, batch, places, doors, connectivity, dict(options or {}))
+            for rows in _play_all([job for job in jobs if isinstance(job, _Job)], backend, workers):
+                done |= {_key(row): row for row in rows}
+            done |= {_key(row): row for row in jobs if isinstance(row, dict)}
+            if file is not None:
+                lines = [json.dumps(done[_key(row)], allow_nan=False) for row in grid if _key(row) in done]
+                write_text(Path(file), "".join(f"{line}\n" for line in lines))
+            report(len(done), len(grid), "scenarios")
     return Study(tuple(done[_key(row)] for row in grid))
 
 
