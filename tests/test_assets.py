@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from bimnav import read_ifc
-from bimnav._asset_names import FIELDS, field_of, is_placeholder
+from bimnav._asset_names import FIELDS, field_of, tells_nothing
 from bimnav.errors import ModelError
 from bimnav.testing import box, room
 from tests.conftest import real_model
@@ -267,17 +267,17 @@ def test_no_name_stands_for_two_fields():
     keine Angabe|Pump: Serial Number|""".replace("\n", "|").split("|"),
 )
 def test_placeholders_say_nothing(value):
-    assert is_placeholder("SerialNumber", value)
+    assert tells_nothing("SerialNumber", value)
 
 
 def test_zero_and_yes_are_no_serial_numbers():
-    assert all(is_placeholder("SerialNumber", value) for value in (0, 0.0, None, True, float("nan")))
-    assert not is_placeholder("SerialNumber", 7)
+    assert all(tells_nothing("SerialNumber", value) for value in (0, 0.0, None, True, float("nan")))
+    assert not tells_nothing("SerialNumber", 7)
 
 
 @given(st.text(max_size=20), st.text(max_size=20))
 def test_any_text_is_judged_without_an_error(name, value):
-    assert is_placeholder(name, value) in (True, False)
+    assert tells_nothing(name, value) in (True, False)
     assert field_of(name) in (None, *FIELDS)
 
 

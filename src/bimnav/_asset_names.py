@@ -6,9 +6,10 @@ import re
 from functools import lru_cache
 from typing import Any
 
+from bimnav._placeholders import is_placeholder
 from bimnav.tasks._words import folded
 
-__all__ = ["FIELDS", "field_of", "is_placeholder", "rank_of"]
+__all__ = ["FIELDS", "field_of", "rank_of", "tells_nothing"]
 
 FIELDS: dict[str, str] = {
     "maker": """manufacturer manufacturername manufacturedby maker make brand hersteller herstellername fabrikat
@@ -78,14 +79,9 @@ _WORDS = {field: tuple(dict.fromkeys(folded(word) for word in words.split())) fo
 _FIELD = {word: (field, rank) for field, words in _WORDS.items() for rank, word in enumerate(words)}
 _COBIE = re.compile(r"^cobie(?:component|type|space|system|spare|facility)?")
 _SAID_OF_NOTHING = """
-    na none null nil nan tbd tba tbc todo unknown undefined notdefined unset default sample example test varies
-    various multiple generic notapplicable notavailable notspecified nodata noinfo empty blank x xx xxx xxxx
-    ddmmyyyy yyyymmdd mmddyyyy unbekannt keine kein keiner keineangabe nichtdefiniert undefiniert standard
-    variiert verschieden onbekend nvt geen inconnu aucun sansobjet indefini desconocido ninguno nodefinido
-    sconosciuto nessuno nondefinito неизвестно нет неопределено 不明 なし 未定 未知 无 暂无 00000000 19001231t235959
-    19001231 19000101 19000101t000000 00010101 00010101t000000 18991230 18991230t000000 19700101 19700101t000000
-    http https www
-"""
+    sample example test multiple generic empty blank x kein keine keiner standard variiert verschieden geen aucun
+    ninguno nessuno нет なし 无 00000000 19700101 19700101t000000 http https www
+"""  # where an asset is described; elsewhere they may say something
 _NOTHING = frozenset(folded(word) for word in _SAID_OF_NOTHING.split())
 _NO_MAKER = frozenset(
     ["revit", "autodesk", "autodeskrevit", "archicad", "graphisoft", "allplan", "sketchup", "generisch"]
@@ -122,10 +118,10 @@ def rank_of(name: str) -> int:
     return known[1] if known else len(_FIELD)
 
 
-def is_placeholder(name: str, value: Any) -> bool:
-    """Tell whether a value says nothing: empty, `n/a`, the property's own name, a template, a zero.
+def tells_nothing(name: str, value: Any) -> bool:
+    """Tell whether a value says nothing about an asset: a placeholder, a template, a zero, a mere yes.
 
-    >>> is_placeholder("SerialNumber", "SerialNumber"), is_placeholder("SerialNumber", "GH468642")
+    >>> tells_nothing("SerialNumber", "SerialNumber"), tells_nothing("SerialNumber", "GH468642")
     (True, False)
     """
     if value is None or isinstance(value, bool):
@@ -133,7 +129,7 @@ def is_placeholder(name: str, value: Any) -> bool:
     if isinstance(value, (int, float)):
         return not value or value != value
     bare, own = _bare(value), _COBIE.sub("", _bare(name))
-    if not bare or not bare.strip("0") or bare in _NOTHING or bare in (own, _bare(name)):
+    if not bare.strip("0") or bare in _NOTHING or bare in (own, _bare(name)) or is_placeholder(name, value):
         return True
     if _TEMPLATE.fullmatch(value.strip()) or any(bare == f"{word}{own}" for word in _SAMPLES):
         return True

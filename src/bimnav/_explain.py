@@ -295,7 +295,12 @@ def _touching(environment: IndoorEnvironment, storey: int, cell: BaseGeometry) -
             picks = () if product is None else _of(_picks(task, product, building), "obstacles", "doors")
             under = obstacle.footprint.intersects(cell)
             yield _blocking(obstacle, picks, "" if under else "; the cell lies within the robot's radius of it")
-    for product in _over(environment, storey, cell):
+    over = {product.global_id: product for product in _over(environment, storey, cell)}
+    for zone in environment.zones:  # those around a thing, too
+        if zone.storey == storey and zone.global_id not in over and zone.polygon.intersects(cell):
+            found = _roles(environment, zone.global_id, _product(building, zone.global_id))
+            yield from (r for r in found if r.role in ("restricted", "avoid") and r.storey == storey)
+    for product in over.values():
         if product.global_id in blocking:
             continue
         told = [r for r in _roles(environment, product.global_id, product) if r.storey in (storey, None)]

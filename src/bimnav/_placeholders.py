@@ -7,9 +7,67 @@ from typing import Any
 
 __all__ = ["is_placeholder"]
 
-_NOTHING = re.compile(
-    r"n/?a|none|null|undefined|not ?defined|unknown|varies|default|tb[dc]|todo|x{2,}|\?+|_[A-Z -]+_|dd/mm/yyyy"
-    r"|1900-12-31(t[\d:]+)?|unbekannt|undefiniert|<default>|-+|sample( \w+)*|lorem ipsum.*|enter \w+ here.*"
+_WORDS = frozenset(
+    [
+        "na",
+        "none",
+        "null",
+        "nil",
+        "nan",
+        "tbd",
+        "tba",
+        "tbc",
+        "todo",
+        "unknown",
+        "undefined",
+        "notdefined",
+        "unset",
+        "default",
+        "varies",
+        "various",
+        "notapplicable",
+        "notavailable",
+        "notspecified",
+        "nodata",
+        "noinfo",
+        "xx",
+        "xxx",
+        "xxxx",
+        "ddmmyyyy",
+        "yyyymmdd",
+        "mmddyyyy",
+        "19001231",
+        "19001231t235959",
+        "19000101",
+        "19000101t000000",
+        "00010101",
+        "00010101t000000",
+        "18991230",
+        "18991230t000000",
+        "unbekannt",
+        "keineangabe",
+        "nichtdefiniert",
+        "undefiniert",
+        "onbekend",
+        "nvt",
+        "inconnu",
+        "sansobjet",
+        "indefini",
+        "indéfini",
+        "desconocido",
+        "nodefinido",
+        "sconosciuto",
+        "nondefinito",
+        "неизвестно",
+        "неопределено",
+        "不明",
+        "未定",
+        "未知",
+        "暂无",
+    ]
+)
+_PHRASES = re.compile(
+    r"x{2,}|1900-12-31(t[\d:]+)?|_[A-Z -]+_|sample( \w+)*|lorem ipsum.*|enter \w+ here.*"
     r"|project (name|number|status|address|issue date)|building name|(nombre|estado) de proyecto|introduzca .*",
     re.IGNORECASE | re.DOTALL,
 )
@@ -23,8 +81,12 @@ def is_placeholder(name: str, value: Any) -> bool:
     """
     if not isinstance(value, str):
         return False
-    return _NOTHING.fullmatch(value.strip()) is not None or _bare(value) == _bare(name or "")
+    bare = _bare(value)
+    if not bare:
+        return bool(value.strip())  # signs alone, such as a dash
+    return bare in _WORDS or bare == _bare(name or "") or _PHRASES.fullmatch(value.strip()) is not None
 
 
 def _bare(text: str) -> str:
-    return text.replace(" ", "").casefold()
+    """Return letters and digits only, without case."""
+    return "".join(char for char in text.casefold() if char.isalnum())

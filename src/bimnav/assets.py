@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import shapely
 
-from bimnav._asset_names import field_of, is_placeholder, rank_of
+from bimnav._asset_names import field_of, rank_of, tells_nothing
 from bimnav.building import Building, Element, Space
 from bimnav.errors import ModelError
 from bimnav.tasks._words import haystack, needle
@@ -300,7 +300,7 @@ def read_asset(building: Building, global_id: str) -> Asset:
         for level in ("occurrence", "type")
         for file, told in facts
         for row in told.get("classifications", ())
-        if row["level"] == level and not is_placeholder("", row["code"] or row["title"])
+        if row["level"] == level and not tells_nothing("", row["code"] or row["title"])
     ]
     filled: dict[str, Any] = {n: t for n, t in values.items() if n not in _LISTED} | _neighbors(building, facts)
     told_by = {name: sources[name] for name in values if name not in _LISTED}
@@ -363,7 +363,7 @@ def _values(facts: Sequence[tuple[str, Mapping[str, Any]]]) -> tuple[dict[str, s
         for row in rows:
             name, value = row["name"], row["value"]
             known = field_of(name)
-            if known is None or is_placeholder(name, value):
+            if known is None or tells_nothing(name, value):
                 continue
             is_type = row["level"] == "type" or "type" in row["set"].casefold().replace("_", " ").split()
             is_type = is_type or "(type)" in row["set"].casefold() or "cobietype" in _squeezed(name)
@@ -379,7 +379,7 @@ def _values(facts: Sequence[tuple[str, Mapping[str, Any]]]) -> tuple[dict[str, s
     contacts = {mail: name for _, told in facts for mail, name in told.get("contacts", {}).items()}
     for name in ("maker", "warranty_guarantor"):
         contact = contacts.get(values.get(name, ""), "")
-        if contact and not is_placeholder("Name", contact):
+        if contact and not tells_nothing("Name", contact):
             values[name] += f" ({contact})"
     return values, sources
 

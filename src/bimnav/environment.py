@@ -529,17 +529,20 @@ def _rated(task: Task, building: Building, levels: Sequence[float]) -> tuple[tup
         if global_id in closed:
             overruled.append(Overruled(global_id, choice.why, f"restricted: {closed[global_id].why}"))
         else:
-            zones += _zones(choice.element, levels, choice.rule.factor, choice.why)
+            zones += _zones(choice, levels, choice.rule.factor)
     for choice in closed.values():
-        zones += _zones(choice.element, levels, math.inf, choice.why)
+        zones += _zones(choice, levels, math.inf)
     return tuple(zones), tuple(overruled)
 
 
-def _zones(product: Element | Space, levels: Sequence[float], factor: float, why: str) -> Iterable[Zone]:
+def _zones(choice: Choice, levels: Sequence[float], factor: float) -> Iterable[Zone]:
+    product, rule, why = choice
     bounds = product.bounds
     if bounds is None:
         return
-    polygon = outline(product.shapes)
+    polygon = grown(outline(product.shapes), rule.margin)
+    if rule.margin:
+        why += f", and {rule.margin:g} m around it"
     low, high = bounds[:, 2].tolist()
     storeys = [storey for storey, level in enumerate(levels) if low - NEAR <= level < high]
     if not storeys and isinstance(product, Element):  # a thing that hangs, or lies flat on the floor

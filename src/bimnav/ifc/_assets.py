@@ -8,6 +8,7 @@ from typing import Any
 
 from ifcopenshell.util.element import get_type
 
+from bimnav.ifc._facts import classified_as
 from bimnav.ifc._products import sorted_of
 from bimnav.ifc._semantics import text_of
 
@@ -87,10 +88,10 @@ class AssetIndex:
             ],
             **self._neighbors.get(step_id, {"upstream": [], "downstream": [], "connected": []}),
             "classifications": [
-                {**row, "level": level}
+                {"system": found.system, "code": found.code, "title": found.title, "level": level}
                 for level, owner in levels
                 for reference in self._of("classification", owner)
-                if (row := _classification(reference))
+                if (found := classified_as(reference)).code or found.title
             ],
             "documents": [
                 row
@@ -243,19 +244,6 @@ def _of_asset(asset: Any) -> Iterator[dict[str, Any]]:
         if isinstance(value, str) and value:
             row = {"level": "occurrence", "set": "IfcAsset", "name": name, "value": value}
             yield row | {"measure": "", "unit": "", "description": ""}
-
-
-def _classification(reference: Any) -> dict[str, str]:
-    code = getattr(reference, "Identification", None) or getattr(reference, "ItemReference", None)
-    source, seen = getattr(reference, "ReferencedSource", None), 0
-    while source is not None and not source.is_a("IfcClassification") and seen < 32:
-        source, seen = getattr(source, "ReferencedSource", None), seen + 1
-    row = {
-        "system": text_of(getattr(source, "Name", None)),
-        "code": text_of(code),
-        "title": text_of(getattr(reference, "Name", None)),
-    }
-    return row if row["code"] or row["title"] else {}
 
 
 def _document(document: Any) -> dict[str, str]:

@@ -9,8 +9,9 @@ from ifcopenshell.util.element import get_psets, get_type
 
 from bimnav.building import Classification, Facts
 from bimnav.ifc._query import plain
+from bimnav.ifc._semantics import text_of
 
-__all__ = ["FactsReader"]
+__all__ = ["FactsReader", "classified_as"]
 
 _type_of: Any = get_type
 
@@ -47,17 +48,17 @@ def _sets(entity: Any) -> dict[str, dict[str, Any]]:
 def _references(entity: Any) -> Iterable[Classification]:
     relations = getattr(entity, "HasAssociations", None) or ()
     found = [r.RelatingClassification for r in relations if r.is_a("IfcRelAssociatesClassification")]
-    return [each for reference in found if reference is not None for each in _classified(reference)]
+    return [classified_as(reference) for reference in found if reference is not None]
 
 
-def _classified(reference: Any) -> Iterator[Classification]:
+def classified_as(reference: Any) -> Classification:
+    """Return what a reference to a classification says."""
     if reference.is_a("IfcClassificationNotation"):  # IFC2X3: a code in facets, of no named system
-        yield Classification("", " ".join(facet.NotationValue for facet in reference.NotationFacets))
-    elif reference.is_a("IfcClassification"):
-        yield Classification(reference.Name or "", "")
-    else:
-        code = getattr(reference, "Identification", None) or getattr(reference, "ItemReference", None) or ""
-        yield Classification(_system_of(reference), str(code).strip(), str(reference.Name or "").strip())
+        return Classification("", " ".join(text_of(facet.NotationValue) for facet in reference.NotationFacets))
+    if reference.is_a("IfcClassification"):
+        return Classification(text_of(reference.Name), "")
+    code = getattr(reference, "Identification", None) or getattr(reference, "ItemReference", None)
+    return Classification(_system_of(reference), text_of(code).strip(), text_of(reference.Name).strip())
 
 
 def _system_of(reference: Any) -> str:
@@ -66,7 +67,7 @@ def _system_of(reference: Any) -> str:
     while reference is not None and reference.id() not in seen:
         seen.add(reference.id())
         if reference.is_a("IfcClassification"):
-            return str(reference.Name or reference.Source or "")
+            return text_of(reference.Name) or text_of(reference.Source)
         reference = getattr(reference, "ReferencedSource", None)
     return ""
 

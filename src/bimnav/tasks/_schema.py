@@ -146,8 +146,19 @@ class DoorTable(RuleTable):
     opening_time: Seconds = Field(0.0, description="Time until such a door is open.")
 
 
+Margin = Annotated[float, Field(ge=0, allow_inf_nan=False, description="How far around it the rule holds, metres.")]
+
+
+class RestrictedTable(RuleTable):
+    """A rule for floor never to enter."""
+
+    margin: Margin = 0.0
+
+
 class AvoidTable(RuleTable):
     """A rule for floor that costs more to cross."""
+
+    margin: Margin = 0.0
 
     factor: float = Field(2.0, ge=1, allow_inf_nan=False, description="Cost of a metre of this floor, at least 1.")
 
@@ -161,7 +172,7 @@ class TaskTable(_Table):
     obstacles: list[RuleTable] = Field([], description="What blocks; without any, everything solid in its way.")
     ignore: list[RuleTable] = Field([], description="What does not block even so.")
     avoid: list[AvoidTable] = Field([], description="Floor that costs more to cross.")
-    restricted: list[RuleTable] = Field([], description="Floor never to enter.")
+    restricted: list[RestrictedTable] = Field([], description="Floor never to enter.")
     exits: list[RuleTable] = Field([], description="Ways out of the building.")
     docks: list[RuleTable] = Field([], description="Where the robot waits and charges.")
     doors: list[DoorTable] = Field([], description="How doors are; the first rule that picks one holds.")
@@ -236,7 +247,12 @@ def _layout(key: Key) -> type[BaseModel]:
         return StandoffTable
     if len(key) < 5:
         return TaskFile if len(key) == 1 else TaskTable
-    tables: dict[object, type[RuleTable]] = {"avoid": AvoidTable, "doors": DoorTable, "targets": TargetTable}
+    tables: dict[object, type[RuleTable]] = {
+        "avoid": AvoidTable,
+        "doors": DoorTable,
+        "restricted": RestrictedTable,
+        "targets": TargetTable,
+    }
     return tables.get(key[2], RuleTable)
 
 

@@ -154,6 +154,9 @@ class Rule:
         In `Task.targets`: words for what a robot must be able to do there; none is the task's.
     factor
         In `Task.avoid`: what a metre of floor costs there, at least 1.
+    margin
+        In `Task.avoid` and `Task.restricted`: metres around the plan view of what is picked in which the rule
+        holds, too, whatever stands between.
     state
         In `Task.doors`: `locked` doors open for robots with their key only, `closed` ones for robots that
         open doors, `automatic` and `open` ones for all.
@@ -191,6 +194,7 @@ class Rule:
     abilities: tuple[str, ...] = ()
     state: DoorState = "closed"
     opening_time: float = 0.0
+    margin: float = 0.0
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -208,6 +212,7 @@ class Rule:
             if getattr(self, name) is not None:
                 _check_number(name, getattr(self, name), 0, unit)
         _check_number("opening_time", self.opening_time, 0, "seconds")
+        _check_number("margin", self.margin, 0, "metres")
         _check_known("state", self.state, get_args(DoorState))
 
     def is_met(self, count: int) -> bool:
