@@ -135,6 +135,7 @@ STEPS = st.one_of(
     st.tuples(st.just("take"), st.integers(0, 3), st.just(0)),
     st.tuples(st.just("door"), st.booleans(), st.just(0)),
     st.tuples(st.just("cost"), st.integers(1, 4), st.integers(0, 2)),
+    st.tuples(st.just("clearance"), st.integers(0, 9), st.integers(0, 2)),
 )
 FRESH = {how: rooms(on_conflict=how) for how in ("approach", "reach")}
 STAIRS = bn.build_graph(environment_of(two_storeys(), ("a", 1, 3), ("b", 2.6, 0.6)), cell_size=0.25)
@@ -162,11 +163,27 @@ def test_any_changes_equal_a_graph_built_anew(world, steps):
             factor = np.random.default_rng(y).choice(
                 [1.0, float(x), 2.5, np.inf], size=graph.frame.shape, p=[0.5, 0.2, 0.28, 0.02]
             )
-            costs.append(factor)
+            costs.append(("with_cost", factor))
             graph = graph.with_cost(factor)
+        elif what == "clearance":
+            costs.append(("with_clearance", x / 5, float(y)))
+            graph = graph.with_clearance(x / 5, float(y))
     placed = tuple(entry.obstacle for entry in graph.changes.placed)
     environment = replace(first.environment, obstacles=(*first.environment.obstacles, *placed))
     built = bn.build_graph(environment, cell_size=first.frame.cell_size, on_conflict=first.on_conflict)
-    for factor in costs:
-        built = built.with_cost(factor)
-    assert_equal(graph, built.block(blocked))
+    built = built.block(blocked)
+    for change, *asked in costs:
+        built = getattr(built, change)(*asked)
+    assert_equal(graph, built)
+
+
+def test_what_stands_in_the_way_since_repels_like_what_stood_there_before():
+    graph = rooms(clearance=0.8)
+    cell = graph.frame.cell_at(3.0, 3.0)
+    changed = graph.with_obstacle(shapely.box(2.6, 2.6, 2.8, 2.8), global_id="crate")
+    assert changed.cost[cell] > graph.cost[cell]
+    assert_equal(changed.without_obstacle("crate"), graph)
+    twice = rooms().with_clearance(0.8).with_clearance(0.4, 2.0).block([cell])
+    assert_equal(twice, rooms().block([cell]).with_clearance(0.8).with_clearance(0.4, 2.0))
+    assert twice.clearances == ((0.8, 4.0), (0.4, 2.0))
+    assert_equal(twice.with_cost(1.0), rooms().block([cell]))

@@ -7,65 +7,14 @@ from typing import Any
 
 __all__ = ["is_placeholder"]
 
-_WORDS = frozenset(
-    [
-        "na",
-        "none",
-        "null",
-        "nil",
-        "nan",
-        "tbd",
-        "tba",
-        "tbc",
-        "todo",
-        "unknown",
-        "undefined",
-        "notdefined",
-        "unset",
-        "default",
-        "varies",
-        "various",
-        "notapplicable",
-        "notavailable",
-        "notspecified",
-        "nodata",
-        "noinfo",
-        "xx",
-        "xxx",
-        "xxxx",
-        "ddmmyyyy",
-        "yyyymmdd",
-        "mmddyyyy",
-        "19001231",
-        "19001231t235959",
-        "19000101",
-        "19000101t000000",
-        "00010101",
-        "00010101t000000",
-        "18991230",
-        "18991230t000000",
-        "unbekannt",
-        "keineangabe",
-        "nichtdefiniert",
-        "undefiniert",
-        "onbekend",
-        "nvt",
-        "inconnu",
-        "sansobjet",
-        "indefini",
-        "indéfini",
-        "desconocido",
-        "nodefinido",
-        "sconosciuto",
-        "nondefinito",
-        "неизвестно",
-        "неопределено",
-        "不明",
-        "未定",
-        "未知",
-        "暂无",
-    ]
-)
+_TOLD = """
+    na none null nil nan tbd tba tbc todo unknown undefined notdefined unset default varies various notapplicable
+    notavailable notspecified nodata noinfo xx xxxx ddmmyyyy yyyymmdd mmddyyyy 19001231 19001231t235959 19000101
+    19000101t000000 00010101 00010101t000000 18991230 18991230t000000 unbekannt keineangabe nichtdefiniert undefiniert
+    onbekend nvt inconnu sansobjet indefini indéfini desconocido nodefinido sconosciuto nondefinito неизвестно
+    неопределено 不明 未定 未知 暂无
+"""
+_WORDS = frozenset(_TOLD.split())
 _PHRASES = re.compile(
     r"x{2,}|1900-12-31(t[\d:]+)?|_[A-Z -]+_|sample( \w+)*|lorem ipsum.*|enter \w+ here.*"
     r"|project (name|number|status|address|issue date)|building name|(nombre|estado) de proyecto|introduzca .*",

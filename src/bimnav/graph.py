@@ -84,6 +84,10 @@ class NavGraph:
         cells' multipliers.
     changes
         What was closed since the graph was built: by `block`, `with_obstacle` and `close_door`.
+    clearances
+        Distance in metres and weight of every `with_clearance` that holds.
+    bare_cost : (storeys, rows, cols) float32
+        The cost without what clearances add; None where there are none.
     """
 
     frame: GridFrame
@@ -99,6 +103,8 @@ class NavGraph:
     refused_connectors: tuple[RefusedConnector, ...] = ()
     objective: Objective = "distance"
     changes: Changes = field(default_factory=Changes)
+    clearances: tuple[tuple[float, float], ...] = ()
+    bare_cost: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         if self.connectivity not in (4, 8):
@@ -405,13 +411,14 @@ class NavGraph:
         conflicts = self._conflicts_with(environment, under)
         reached = [conflict.cell for conflict in conflicts] if self.on_conflict == "reach" else []
         kept = np.intersect1d(under, indexes_of(reached, self.frame))
-        cost, obstacle, changes, cells = changed_arrays(self.cost, self.obstacle, before, blocked, placed, kept)
+        bare = self.cost if self.bare_cost is None else self.bare_cost
+        cost, obstacle, changes, cells = changed_arrays(bare, self.obstacle, before, blocked, placed, kept)
         for cell in reached:  # one that no floor carries, as when it is cut
             if environment is not None and not self.floor[cell] and indexes_of([cell], self.frame)[0] in kept:
                 cost[cell] = zone_factor(self.frame, environment, cell)
         graph = replace(
             self,
-            cost=_frozen(cost),
+            **self._costs(_frozen(cost), self.clearances),
             obstacle=_frozen(obstacle),
             environment=environment,
             conflicts=conflicts,
@@ -449,7 +456,7 @@ class NavGraph:
         return replace(self, connectors=connectors, refused_connectors=refused)
 
     def with_cost(self, factor: ArrayLike) -> Self:
-        """Return the graph with other costs; what is blocked stays blocked.
+        """Return the graph with other costs; what is blocked stays blocked, and no `with_clearance` holds any more.
 
         Parameters
         ----------
@@ -458,14 +465,14 @@ class NavGraph:
         """
         given = np.broadcast_to(np.asarray(factor, dtype=np.float32), self.frame.shape)
         cost = _frozen(np.where(self.free, given, np.float32(np.inf)))
-        graph = replace(self, cost=cost, changes=self.changes.with_cost(given))
+        graph = replace(self, cost=cost, bare_cost=None, clearances=(), changes=self.changes.with_cost(given))
         return graph._rejoined(np.flatnonzero(self.free & ~graph.free))
 
     def with_clearance(self, metres: float, weight: float = 4.0) -> Self:
         """Return the graph with cells dearer the nearer they lie to blocked ones, so that paths keep away.
 
         Only the cost changes: where there is no other way, a path goes through all the same. What the
-        robot must keep away from at all costs is its radius. Cells that are closed later repel nothing.
+        robot must keep away from at all costs is its radius. What is closed later repels, too.
 
         Parameters
         ----------
@@ -474,9 +481,19 @@ class NavGraph:
         weight
             Added to the multiplier right beside an obstacle; it falls with the square of the distance missing.
         """
+        bare = self.cost if self.bare_cost is None else self.bare_cost
+        return replace(self, **self._costs(bare, (*self.clearances, (metres, weight))))
+
+    def _costs(self, bare: NDArray[np.float32], clearances: tuple[tuple[float, float], ...]) -> dict[str, Any]:
+        """Return the fields of a graph of which the cost is known but for what clearances add."""
+        if not clearances:
+            return {"cost": bare, "bare_cost": None, "clearances": ()}
         from bimnav._clearance import clearance_factors
 
-        return replace(self, cost=self.cost * clearance_factors(self.free, self.frame.cell_size, metres, weight))
+        free, cost = np.isfinite(bare), bare
+        for metres, weight in clearances:
+            cost = cost * clearance_factors(free, self.frame.cell_size, metres, weight)
+        return {"cost": _frozen(cost), "bare_cost": bare, "clearances": clearances}
 
     def with_objective(self, objective: Objective) -> Self:
         """Return the graph whose paths make something else least."""
