@@ -560,3 +560,21 @@ def test_a_trajectory_moves_on_in_time_and_holds_the_whole_way(case):
     assert [(row[0], row[1], row[3]) for row in result.route_rows()] == [
         (row["x"], row["y"], row["time"]) for row in table
     ]
+
+
+@laws
+@given(played())
+def test_a_tour_that_nothing_can_disturb_is_played_as_if_something_could(case):
+    tour, robot, seconds, result = case
+    begin = float(result.track.times[0])
+    slowly = simulate(
+        tour,
+        robot=robot,
+        service_time=lambda r, stop, g: seconds[stop.global_id],
+        start_time=begin,
+        speed=robot.speed,  # drawn for every leg, so that every leg is planned by itself
+    )
+    assert slowly.log.rows == result.log.rows
+    assert slowly.tallies == result.tallies
+    for name in ("times", "points", "statuses", "storeys", "stops", "eases", "turns"):
+        np.testing.assert_array_equal(getattr(slowly.track, name), getattr(result.track, name))

@@ -17,9 +17,9 @@ from bimnav.robot import Robot
 from bimnav.sim.areas import cut_at
 from bimnav.sim.energy import Battery
 from bimnav.sim.knowledge import Closure
-from bimnav.sim.log import Event, EventKind
-from bimnav.sim.motion import Motion, drive, drive_all, rest, stand
-from bimnav.sim.routes import JOINED, Line, end_of, legs_of
+from bimnav.sim.log import EventKind, new_event
+from bimnav.sim.motion import Motion, drive, rest, stand
+from bimnav.sim.routes import JOINED, Legs, Line, end_of, legs_of
 from bimnav.sim.track import RobotStatus, TrackRecorder
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ __all__ = ["Errand", "Order", "RobotAgent"]
 Process: TypeAlias = Generator[simpy.Event, Any, None]
 Step: TypeAlias = Generator[simpy.Event, Any, bool]
 
+_NEXT = "next stop"  # why robots depart, if for nothing else
 _RESERVE = 0.1  # of a full battery; a robot that would have less left on arrival at a charger charges first
 _GLANCE = 1.0  # seconds after which a robot that makes way looks again
 _AHEAD = 1.0  # seconds of free way ahead with which it goes on
@@ -63,7 +64,7 @@ class Errand:
     end: tuple[float, float, float]
     index: int = -1
     leg: Line | None = None
-    purpose: str = "next stop"
+    purpose: str = _NEXT
     seconds: float | None = None  # of service, once drawn
     is_late: bool = False  # put last because its way was closed
     is_begun: bool = False  # departed for
@@ -108,19 +109,19 @@ class RobotAgent:
         self.line: Line | None = None  # what is left of the way, as it was when the last stretch began
         self.stuck_since: float | None = None
         self.under_way: tuple[float, Motion] | None = None
-        self.is_plain = math.isinf(robot.acceleration) and math.isinf(robot.turn_rate) and world.is_plain
-        self.motions: dict[int, Motion] = {}
+        self.undisturbed: Legs | None = None  # what is done in one go
         self._take(tour)
         self.process = world.clock.process(self.execute())
 
     def _take(self, tour: Tour) -> None:
         legs = legs_of(tour)
-        if self.is_plain and self.world.setting.speed is None:
-            self.motions = drive_all(legs, self.robot)
-        for k, stop in enumerate(tour.stops):
-            self.agenda.append(Errand(stop, stop.cell, stop.end, k, legs[k]))
+        if self.stops and self.world.is_undisturbed(self):
+            self.undisturbed = legs
+        else:
+            for k, stop in enumerate(tour.stops):
+                self.agenda.append(Errand(stop, stop.cell, stop.end, k, legs.line(k)))
         if len(legs) > len(tour.stops):
-            self.home = self.homeward(legs[-1])
+            self.home = self.homeward(legs.line(len(legs) - 1))
 
     def homeward(self, leg: Line | None = None) -> Errand:
         """Return the way to where the tour ends behind its last stop."""
@@ -137,11 +138,10 @@ class RobotAgent:
         if self.tires:
             self.settle()
             share = self.battery.share
-        of = ("", "") if target is None else (target.global_id, target.name)
+        of, called = ("", "") if target is None else (target.global_id, target.name)
         storey = world.storeys[self.storey]
-        world.write(
-            Event(now, self.name, event, self.status, storey, x, y, z, *of, cause, self.leg_distance, share, asset)
-        )
+        row = (now, self.name, event, self.status, storey, x, y, z, of, called, cause, self.leg_distance, share, asset)
+        world.write(new_event(row))
 
     def settle(self) -> None:
         """Draw what the time since the last change of status took from the battery."""
@@ -172,7 +172,7 @@ class RobotAgent:
 
     def close_books(self) -> None:
         """Count nothing after the last event."""
-        if not self.recorder.pieces and self.world.keeps_history:
+        if self.recorder.is_empty and self.world.keeps_history:
             self.record()
 
     # --- being disturbed
@@ -210,6 +210,8 @@ class RobotAgent:
         self.note("start")
         for lost in self.tour.unreached:
             self.note("unreached", lost, lost.reason)
+        if self.undisturbed is not None:
+            yield from self.work_through(self.undisturbed)
         while not self.is_over:
             if self.orders:
                 yield from self.obey()
@@ -228,6 +230,50 @@ class RobotAgent:
                     yield from self.recharge(errand)
                 else:
                     yield from self.serve(errand)
+
+    def work_through(self, legs: Legs) -> Process:
+        """Do every stop of a tour that nothing can disturb: what `go` and `serve` do, without looking around."""
+        world, clock, name = self.world, self.world.clock, self.name
+        write, pass_time, removable = world.write, world.pass_time, world.removable
+        moving, working, idle = RobotStatus.MOVING, RobotStatus.WORKING, RobotStatus.IDLE
+        reached = legs.reached()
+        times, last = reached / self.robot.speed, legs.edges[1:] - 1
+        lengths, durations, storeys = reached[last].tolist(), times[last].tolist(), legs.storeys[last].tolist()
+        begins, arrivals, ends = [], [], []
+        (x, y, z), floor = self.place, world.storeys[self.storey]
+        for stop, length, duration, storey in zip(self.stops, lengths, durations, storeys, strict=False):
+            target, called = stop.global_id, stop.name
+            begin = clock.now
+            write(new_event((begin, name, "depart", moving, floor, x, y, z, target, called, _NEXT, 0.0, None, "")))
+            yield pass_time(duration)
+            now, (x, y, z), floor = clock.now, stop.end, world.storeys[storey]
+            place = (floor, x, y, z, target, called)
+            write(new_event((now, name, "arrive", idle, *place, stop.approach, length, None, world.asset_of(stop))))
+            write(new_event((now, name, "begin_service", working, *place, "", length, None, "")))
+            begins.append(begin)
+            arrivals.append(now)
+            yield pass_time(world.draw_seconds(self, stop))
+            now = clock.now
+            write(new_event((now, name, "end_service", idle, *place, "", length, None, "")))
+            ends.append(now)
+            self.served.append(target)
+            if target in removable:
+                removable.remove(target)
+                write(new_event((now, name, "remove", idle, *place, "served", length, None, "")))
+            self.distance += length
+        self.place, self.storey, self.leg_distance = (x, y, z), storey, length
+        self.last = self.since = now
+        self._settle_rounds(begins, arrivals, ends)
+        if world.keeps_history:
+            self.recorder.add_rounds(legs, times, begins, arrivals)
+
+    def _settle_rounds(self, begins: list[float], arrivals: list[float], ends: list[float]) -> None:
+        """Count the time that a tour took, and draw what it takes."""
+        moments = np.column_stack([begins, arrivals, ends])
+        for moving, working in np.diff(moments, axis=1).tolist():
+            for status, seconds in ((RobotStatus.MOVING, moving), (RobotStatus.WORKING, working)):
+                self.seconds[status] += seconds
+                self.battery.spend(status, seconds)
 
     def choose(self) -> Errand | None:
         """Return what to do next: the next errand, or to charge before it."""
@@ -433,7 +479,7 @@ class RobotAgent:
 
     def move(self, stretch: Stretch, after: list[Stretch], errand: Errand) -> Step:
         """Drive one stretch, and stop for what comes in the way; answer whether its end was reached."""
-        motion = self.motions.get(id(stretch.points)) or drive(
+        motion = drive(
             stretch.points,
             stretch.storeys,
             self.robot,

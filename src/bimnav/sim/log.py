@@ -7,6 +7,7 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeAlias
@@ -18,7 +19,7 @@ from bimnav.sim.track import RobotStatus
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Event", "EventKind", "EventLog", "csv_text"]
+__all__ = ["Event", "EventKind", "EventLog", "csv_text", "new_event"]
 
 EventKind: TypeAlias = Literal[
     "start",
@@ -101,6 +102,9 @@ class Event(NamedTuple):
     battery: float | None = None
     asset: str = ""
 
+
+new_event = partial(tuple.__new__, Event)
+"""Make an event from a tuple of all its columns, in half the time that keywords and defaults take."""
 
 _OPTIONAL = {"battery": None, "asset": ""}  # columns, and what they hold where they say nothing
 

@@ -6,17 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bimnav.robot import Robot
 
-if TYPE_CHECKING:
-    from bimnav.sim.routes import Line
-
-__all__ = ["Motion", "drive", "drive_all", "rest", "stand"]
+__all__ = ["Motion", "drive", "rest", "stand"]
 
 _SAME_POINT = 1e-9  # metres
 _NOW, _EVEN = np.zeros(1), np.ones(1)
@@ -206,31 +202,6 @@ def drive(
     tops = np.full(len(lengths), speed) if limits is None else np.minimum(speed, np.asarray(limits)[kept[1:]])
     turns = _turns(line, heading) if math.isfinite(robot.turn_rate) else np.zeros(len(lengths))
     return _driven(line, on, lengths, tops, turns, robot)
-
-
-def drive_all(lines: Sequence[Line], robot: Robot) -> dict[int, Motion]:
-    """Plan many lines at once for a robot that starts, stops and turns at once; see `drive`.
-
-    Returns
-    -------
-    motions
-        By the identity of the points of each line; equal to what `drive` plans, to the last bit.
-    """
-    if not lines:
-        return {}
-    sizes = [len(line.points) for line in lines]
-    every = np.concatenate([line.points for line in lines])
-    steps = np.linalg.norm(np.diff(every, axis=0), axis=1)
-    ones, zeros = np.ones(max(sizes)), np.zeros(max(sizes))
-    motions, first = {}, 0
-    for line, n in zip(lines, sizes, strict=True):
-        reached = np.empty(n)
-        reached[0] = 0.0
-        steps[first : first + n - 1].cumsum(out=reached[1:])
-        motion = Motion(reached / robot.speed, line.points, line.storeys, ones[:n], zeros[:n], float(reached[-1]))
-        motions[id(line.points)] = motion
-        first += n
-    return motions
 
 
 def _turns(line: NDArray[np.float64], heading: float | None) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from bimnav.graph import NavGraph
     from bimnav.plan import Tour
 
-__all__ = ["JOINED", "Line", "cell_near", "end_of", "legs_of", "way_between"]
+__all__ = ["JOINED", "Legs", "Line", "cell_near", "end_of", "legs_of", "way_between"]
 
 JOINED = 1e-6  # metres between the end of one leg and the start of the next
 
@@ -42,8 +43,43 @@ class Line:
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
-def legs_of(tour: Tour) -> list[Line]:
-    """Return the route as lines that begin where the last one ended and end where the stop says.
+@dataclass(frozen=True, slots=True, eq=False)
+class Legs:
+    """The legs of a tour, one after another in one table.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, metres
+    storeys : (n,) int32, indexes of storeys
+    edges : (legs + 1,) int64
+        Rows at which legs begin, and n.
+    """
+
+    points: NDArray[np.float64]
+    storeys: NDArray[np.int32]
+    edges: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.edges) - 1
+
+    def line(self, index: int) -> Line:
+        """Return one leg as a line."""
+        rows = slice(int(self.edges[index]), int(self.edges[index + 1]))
+        return Line(self.points[rows], self.storeys[rows])
+
+    def reached(self) -> NDArray[np.float64]:
+        """Return how far every point is from the begin of its leg, (n,) metres."""
+        reached = np.zeros(len(self.points))
+        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        sizes = np.diff(self.edges)
+        for size in np.unique(sizes).tolist():
+            rows = self.edges[:-1][sizes == size, None] + np.arange(size - 1)
+            reached[rows + 1] = steps[rows].cumsum(axis=1)
+        return reached
+
+
+def legs_of(tour: Tour) -> Legs:
+    """Return the route as legs that begin where the last one ended and end where the stop says.
 
     Raises
     ------
@@ -59,30 +95,37 @@ def legs_of(tour: Tour) -> list[Line]:
         raise SimulationError(f"a tour of {len(tour.stops)} stops has {len(tour.route)} legs.")
     lines = [np.asarray(polyline, dtype=np.float64) for polyline in tour.route]
     for k, leg in enumerate(lines):
-        if leg.ndim != 2 or leg.shape[1] != 3 or not len(leg) or not np.isfinite(leg).all():
+        if leg.ndim != 2 or leg.shape[1] != 3 or not len(leg):
             raise SimulationError(f"leg {k} of the tour is no polyline of finite points.", "", {"leg": k})
     if not lines:
-        return []
+        return Legs(np.empty((0, 3)), np.empty(0, dtype=np.int32), np.zeros(1, dtype=np.int64))
+    edges = np.cumsum([0, *map(len, lines)])
     every = np.concatenate(lines)
+    wrong = np.flatnonzero(~np.isfinite(every).all(axis=1))
+    if len(wrong):
+        k = int(np.searchsorted(edges, wrong[0], side="right")) - 1
+        raise SimulationError(f"leg {k} of the tour is no polyline of finite points.", "", {"leg": k})
+    _check_gaps(every[edges[:-1]], every[edges[1:] - 1], np.array([tour.start_point, *ends], dtype=np.float64))
     floor = tour.start.storey
-    is_level = set(storeys) == {floor} and bool(
-        (np.abs(every[:, 2] - tour.graph.frame.elevations[floor]) <= JOINED).all()
-    )
-    level = np.full(max(map(len, lines)), floor, dtype=np.int32)
-    legs, here, before = [], tour.start_point, floor
-    for k, (leg, end, after) in enumerate(zip(lines, ends, storeys, strict=True)):
-        gaps = math.dist(here, leg[0].tolist()), math.dist(leg[-1].tolist(), end)
-        if not max(gaps) <= JOINED:
-            raise SimulationError(
-                f"leg {k} of the tour begins {gaps[0]:.6g} m from where the robot is "
-                f"and ends {gaps[1]:.6g} m from where it should stop.",
-                "A route is one unbroken line through the ends of its stops.",
-                {"leg": k},
-            )
-        on = level[: len(leg)] if is_level else _storeys_along(leg, tour.graph.frame, before, after)
-        legs.append(Line(leg, on))
-        here, before = end, after
-    return legs
+    if set(storeys) == {floor} and (np.abs(every[:, 2] - tour.graph.frame.elevations[floor]) <= JOINED).all():
+        return Legs(every, np.full(len(every), floor, dtype=np.int32), edges)
+    on = [
+        _storeys_along(leg, tour.graph.frame, before, after)
+        for leg, (before, after) in zip(lines, pairwise([floor, *storeys]), strict=True)
+    ]
+    return Legs(every, np.concatenate(on), edges)
+
+
+def _check_gaps(begins: NDArray[np.float64], ends: NDArray[np.float64], places: NDArray[np.float64]) -> None:
+    """Refuse legs that do not lead from each place to the next."""
+    before, after = (np.linalg.norm(gap, axis=1) for gap in (begins - places[:-1], ends - places[1:]))
+    for k in np.flatnonzero(~(np.maximum(before, after) <= JOINED))[:1].tolist():
+        raise SimulationError(
+            f"leg {k} of the tour begins {before[k]:.6g} m from where the robot is "
+            f"and ends {after[k]:.6g} m from where it should stop.",
+            "A route is one unbroken line through the ends of its stops.",
+            {"leg": k},
+        )
 
 
 def end_of(tour: Tour) -> tuple[Cell, tuple[float, float, float]]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,7 @@ from bimnav.errors import SimulationError, ValueRangeError
 
 if TYPE_CHECKING:
     from bimnav.sim.motion import Motion
+    from bimnav.sim.routes import Legs
 
 __all__ = ["RobotState", "RobotStatus", "Track", "TrackRecorder", "wrapped"]
 
@@ -208,28 +210,76 @@ def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return turned
 
 
+_Rows: TypeAlias = tuple[NDArray[Any], ...]  # the columns of a track, in the order of its fields
+
+
 @dataclass(slots=True)
 class TrackRecorder:
     """Collects the rows of a track, piece by piece."""
 
     pieces: list[tuple[float, Motion, str, int]] = field(default_factory=list)
+    tables: list[_Rows] = field(default_factory=list)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was added yet."""
+        return not (self.pieces or self.tables)
 
     def add(self, begin: float, motion: Motion, status: RobotStatus, stop: int) -> None:
         """Add the rows of a motion that began at a time, all with one status and one stop."""
         self.pieces.append((begin, motion, str(status), stop))
 
+    def add_rounds(
+        self, legs: Legs, times: NDArray[np.float64], begins: Sequence[float], arrivals: Sequence[float]
+    ) -> None:
+        """Add a tour that nothing disturbed: every leg, and the work at its stop.
+
+        Parameters
+        ----------
+        times : (n,) seconds from the begin of its leg to every point
+        begins, arrivals
+            Seconds on the clock when each leg began, and when work at its stop did.
+        """
+        self._tabulate()
+        edges = legs.edges[: len(begins) + 1]
+        rows, behind = int(edges[-1]), edges[1:]
+        indexes = np.arange(len(begins), dtype=np.int32)
+        driven = np.repeat(np.asarray(begins, dtype=np.float64), np.diff(edges)) + times[:rows]
+        statuses = np.insert(np.full(rows, str(RobotStatus.MOVING), "U8"), behind, str(RobotStatus.WORKING))
+        self.tables.append(
+            (
+                np.insert(driven, behind, arrivals),
+                np.insert(legs.points[:rows], behind, legs.points[behind - 1], axis=0),
+                statuses,
+                np.insert(legs.storeys[:rows], behind, legs.storeys[behind - 1]),
+                np.insert(np.repeat(indexes, np.diff(edges)), behind, indexes),
+                np.ones(len(statuses)),
+                np.zeros(len(statuses)),
+            )
+        )
+
     def finish(self) -> Track:
         """Return everything that was added as one track."""
-        begins, motions, statuses, stops = zip(*self.pieces, strict=True)
-        sizes = [len(motion.times) for motion in motions]
-        times = np.concatenate([begin + motion.times for begin, motion in zip(begins, motions, strict=True)])
+        self._tabulate()
+        times, *columns = (np.concatenate(parts) for parts in zip(*self.tables, strict=True))
         level = np.maximum.accumulate(times)  # the clock adds up pieces of a motion, and rounds
-        return Track(
-            np.where(level - times <= _ROUNDING, level, times),
-            np.concatenate([motion.points for motion in motions]),
-            np.repeat(statuses, sizes),
-            np.concatenate([motion.storeys for motion in motions]),
-            np.repeat(stops, sizes),
-            np.concatenate([motion.eases for motion in motions]),
-            np.concatenate([motion.turns for motion in motions]),
+        return Track(np.where(level - times <= _ROUNDING, level, times), *columns)
+
+    def _tabulate(self) -> None:
+        """Put the pieces so far in one table."""
+        if not self.pieces:
+            return
+        begins, motions, statuses, stops = zip(*self.pieces, strict=True)
+        self.pieces = []
+        sizes = [len(motion.times) for motion in motions]
+        self.tables.append(
+            (
+                np.concatenate([begin + motion.times for begin, motion in zip(begins, motions, strict=True)]),
+                np.concatenate([motion.points for motion in motions]),
+                np.repeat(np.array(statuses, "U8"), sizes),
+                np.concatenate([motion.storeys for motion in motions]),
+                np.repeat(stops, sizes),
+                np.concatenate([motion.eases for motion in motions]),
+                np.concatenate([motion.turns for motion in motions]),
+            )
         )

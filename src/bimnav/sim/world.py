@@ -177,12 +177,13 @@ class World:
         """Return the event that this many seconds have passed; never, for inf."""
         if seconds == math.inf:
             return self.clock.event()
-        if not (seconds >= 0 and self.clock.now + seconds <= LATEST):  # nan would corrupt simpy's queue
-            raise SimulationError(
-                f"the simulation would reach {self.clock.now + seconds:g} s.",
-                f"It ends at {LATEST:g} s; check the speed and the service times.",
-            )
-        return self.clock.timeout(seconds)
+        clock = self.clock
+        if seconds >= 0 and clock.now + seconds <= LATEST:  # nan would corrupt simpy's queue
+            return clock.timeout(seconds)
+        raise SimulationError(
+            f"the simulation would reach {clock.now + seconds:g} s.",
+            f"It ends at {LATEST:g} s; check the speed and the service times.",
+        )
 
     def note(
         self,
@@ -223,12 +224,23 @@ class World:
         """Return the seconds of service at a stop, drawn once."""
         if errand.seconds is None:
             assert errand.stop is not None  # noqa: S101 - only stops are served
-            errand.seconds = _service_seconds(errand.stop, agent.robot, self.setting.service_time, agent.rng)
+            errand.seconds = self.draw_seconds(agent, errand.stop)
         return errand.seconds
+
+    def draw_seconds(self, agent: RobotAgent, stop: Stop) -> float:
+        """Draw the seconds of service at a stop."""
+        return _service_seconds(stop, agent.robot, self.setting.service_time, agent.rng)
 
     def label_of(self, name: str) -> str:
         """Return what the log calls a resource."""
         return self.doors[name].label if name in self.doors else f"charger {name}" if name in self.chargers else name
+
+    def is_undisturbed(self, agent: RobotAgent) -> bool:
+        """Tell whether nothing can come between a robot and its tour, and it starts, stops and turns at once."""
+        robot = agent.robot
+        is_agile = math.isinf(robot.acceleration) and math.isinf(robot.turn_rate) and not agent.tires
+        is_simple = all(stop.kind == "target" and stop.heading is None for stop in agent.stops)
+        return is_agile and is_simple and self.is_plain and not self.is_eventful and self.setting.speed is None
 
     def asset_of(self, stop: Stop) -> str:
         """Return maker, model and the like of a target, if the model tells."""
