@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -180,3 +181,14 @@ def test_the_public_names_are_the_same_for_programs_and_type_checkers():
     assert static == bn._HOME
     for name in bn.__all__:
         assert getattr(bn, name) is not None
+
+
+@pytest.mark.parametrize("command", ["", "run", "inspect", "tasks", "robots", "cache", "doctor"])
+def test_every_help_text_has_examples_and_explains_every_option(command, capsys):
+    with pytest.raises(SystemExit):
+        main([*command.split(), "--help"])
+    text = capsys.readouterr().out
+    examples = text.partition("\nexamples:\n")[2].strip().splitlines()
+    assert all(line.strip().startswith("bimnav ") for line in examples[:2])
+    for option in re.findall(r"^  (--\S+.*(?:\n {10,}.*)*)", text, re.MULTILINE):
+        assert re.search(r"\S(?: {2,}|\n +)\S", option), f"nothing is said of {option}"

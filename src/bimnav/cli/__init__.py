@@ -23,6 +23,13 @@ _SIGNED = (
     "--speed",
 )  # their values may begin with a minus
 
+_EXAMPLES = """\
+examples:
+  bimnav inspect house.ifc
+  bimnav run house.ifc --task cleaning --cell 10cm --out out
+  bimnav COMMAND --help
+"""
+
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
@@ -63,7 +70,12 @@ def _joined(arguments: list[str]) -> list[str]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="bimnav", description="From IFC building models to robot tasks, routes and simulation.")
+    parser = _Parser(
+        prog="bimnav",
+        description="From IFC building models to robot tasks, routes and simulation.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--version", action="version", version=f"bimnav {bn.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for room in (_run, _inspect, _tasks, _robots, _cache, _doctor):

@@ -10,12 +10,23 @@ from bimnav.cli._shared import DONE, show, show_json
 if TYPE_CHECKING:
     from bimnav.cli._shared import Commands
 
+_EXAMPLES = """\
+examples:
+  bimnav cache
+  bimnav cache clear
+"""
+
 
 def add_to(commands: Commands) -> None:
     """Add the command to the parser."""
-    cache = commands.add_parser("cache", help="show or clear what reading has kept")
+    cache = commands.add_parser(
+        "cache",
+        help="show or clear what reading has kept",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     cache.add_argument("action", nargs="?", choices=("show", "clear"), default="show")
-    cache.add_argument("--json", action="store_true")
+    cache.add_argument("--json", action="store_true", help="print JSON for machines")
     cache.set_defaults(command=_command)
 
 

@@ -10,11 +10,22 @@ from bimnav.cli._shared import BUG, DONE, show, show_json
 if TYPE_CHECKING:
     from bimnav.cli._shared import Commands
 
+_EXAMPLES = """\
+examples:
+  bimnav doctor
+  bimnav doctor --json > doctor.json
+"""
+
 
 def add_to(commands: Commands) -> None:
     """Add the command to the parser."""
-    doctor = commands.add_parser("doctor", help="print versions and test the installation")
-    doctor.add_argument("--json", action="store_true")
+    doctor = commands.add_parser(
+        "doctor",
+        help="print versions and test the installation",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    doctor.add_argument("--json", action="store_true", help="print JSON for machines")
     doctor.set_defaults(command=_command)
 
 

@@ -11,10 +11,23 @@ from bimnav.cli._shared import DONE, length, show, show_json
 if TYPE_CHECKING:
     from bimnav.cli._shared import Commands
 
+_EXAMPLES = """\
+examples:
+  bimnav inspect house.ifc
+  bimnav inspect architecture.ifc electrical.ifc --json
+  bimnav inspect house.ifc --readiness --radius 30cm --html readiness.html
+  bimnav inspect house.ifc --asset 2O2Fr$t4X7Zf8NOew3FNr2 --upstream valve
+"""
+
 
 def add_to(commands: Commands) -> None:
     """Add the command to the parser."""
-    inspect = commands.add_parser("inspect", help="say what a model holds, and what is wrong with it")
+    inspect = commands.add_parser(
+        "inspect",
+        help="say what a model holds, and what is wrong with it",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     inspect.add_argument("models", nargs="+", metavar="MODEL.ifc", help="one file, or several of one building")
     inspect.add_argument("--readiness", action="store_true", help="say which rooms and doors a robot reaches")
     inspect.add_argument("--html", metavar="FILE", help="write the readiness report as a page")
@@ -22,7 +35,7 @@ def add_to(commands: Commands) -> None:
     inspect.add_argument("--height", type=length, default=1.0, help="of that robot (default: 1)")
     inspect.add_argument("--asset", metavar="GLOBAL_ID", help="print the asset card of an element or a room")
     inspect.add_argument("--upstream", metavar="KIND", help="with --asset: the way to the first valve, breaker, ...")
-    inspect.add_argument("--json", action="store_true")
+    inspect.add_argument("--json", action="store_true", help="print JSON for machines")
     inspect.set_defaults(command=_command)
 
 

@@ -13,13 +13,27 @@ if TYPE_CHECKING:
     from bimnav.cli._shared import Commands
     from bimnav.robot import Robot
 
+_EXAMPLES = """\
+examples:
+  bimnav robots
+  bimnav robots show inspection
+  bimnav robots show robots.toml#scout --json
+
+robots of your own are known by name if BIMNAV_ROBOTS lists their folder.
+"""
+
 
 def add_to(commands: Commands) -> None:
     """Add the command to the parser."""
-    robots = commands.add_parser("robots", help="list the robots there are, or show one")
+    robots = commands.add_parser(
+        "robots",
+        help="list the robots there are, or show one",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     robots.add_argument("action", nargs="?", choices=("list", "show"), default="list")
     robots.add_argument("robot", nargs="?", metavar="NAME|FILE#NAME", help="with show: which one")
-    robots.add_argument("--json", action="store_true")
+    robots.add_argument("--json", action="store_true", help="print JSON for machines")
     robots.set_defaults(command=_command)
 
 

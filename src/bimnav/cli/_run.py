@@ -46,7 +46,9 @@ def add_to(commands: Commands) -> None:
     run.add_argument("--radius", type=length, help="of the robot (default: the profile's; 0, the paper's point)")
     run.add_argument("--height", type=length, help="of the robot (default: the profile's; 1)")
     run.add_argument("--speed", type=length, help="metres per second (default: the profile's; 0.5)")
-    run.add_argument("--target", type=target, action="append", default=[], metavar="NAME@X,Y[,STOREY]")
+    run.add_argument(
+        "--target", type=target, action="append", default=[], metavar="NAME@X,Y[,STOREY]", help="may be repeated"
+    )
     run.add_argument("--targets", action="append", default=[], metavar="FILE", help="CSV or JSON of detected objects")
     run.add_argument("--refine", choices=("auto",), help="halve the cells until no target lies on an obstacle cell")
     run.add_argument(

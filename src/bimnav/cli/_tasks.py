@@ -57,7 +57,7 @@ def add_to(commands: Commands) -> None:
 
 
 def _add_options(parser: argparse.ArgumentParser, **more: Any) -> None:
-    parser.add_argument("--json", action="store_true", **more)
+    parser.add_argument("--json", action="store_true", help="print JSON for machines", **more)
     parser.add_argument(
         "--tasks-path",
         action="append",
