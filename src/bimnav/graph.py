@@ -234,7 +234,7 @@ class NavGraph:
         return seconds * power * link.factor
 
     def seconds_over(self, link: Link, robot: Robot | None = None) -> float:
-        """Return how long a link takes: a lift its own time; a stair or ramp as much longer as a robot is slower.
+        """Return how long a link takes: a ride its own time, what is driven as much longer as a robot is slower.
 
         Parameters
         ----------
@@ -245,7 +245,14 @@ class NavGraph:
         speed = own if robot is None else robot.speed
         if link.seconds is None:
             return link.length / speed
-        return link.seconds if link.kind == "lift" else link.seconds * own / speed
+        driven = link.seconds if link.kind != "lift" else min(self.seconds_beside(link), link.seconds)
+        return link.seconds - driven + driven * own / speed
+
+    def seconds_beside(self, link: Link) -> float:
+        """Return how much of a link, in seconds, the robot of the graph drives on the flat, as to a lift's cabin."""
+        levels = self.frame.elevations
+        rise = abs(levels[link.end.storey] - levels[link.begin.storey])
+        return max(link.length - rise, 0.0) / self._robot.speed
 
     @cached_property
     def links(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -388,28 +388,33 @@ class RobotAgent:
                 return False
         self.avoided = None
         errand.leg = None
-        self.become(RobotStatus.IDLE)
         self.place = errand.end
         self.storey = int(leg.storeys[-1])
-        self.turn_to(errand)
+        yield from self.turn_to(errand)
+        self.become(RobotStatus.IDLE)
         asset = self.world.asset_of(errand.stop) if errand.stop else ""
         self.note("arrive", errand.stop, errand.stop.approach if errand.stop else "", asset)
         return True
 
-    def turn_to(self, errand: Errand) -> None:
-        """Face the way a stop asks for; a robot without a turn rate does so at once."""
+    def turn_to(self, errand: Errand) -> Process:
+        """Face the way a stop asks for, before the work begins; a robot without a turn rate does so at once."""
         wanted = None if errand.stop is None else errand.stop.heading
-        if wanted is None or not self.world.keeps_history:
+        takes_time = math.isfinite(self.robot.turn_rate)
+        if wanted is None or not (self.world.keeps_history or takes_time):
             return
         pieces = self.recorder.pieces
-        if self.heading is None and pieces:
-            self.heading = _heading(pieces[-1][1].points)
-        turn = math.remainder(wanted - (self.heading or 0.0), 2 * math.pi)
-        if turn:
-            self.recorder.add(
-                float(self.world.clock.now), stand(self.place, self.storey, turn), self.status, errand.index
-            )
-            self.heading = wanted
+        along = _heading(pieces[-1][1].points) if pieces and not takes_time else None
+        facing = self.heading if along is None else along
+        if facing is None:  # one that turns slowly and has not moved faces the right way
+            facing = wanted if takes_time else 0.0
+        turn = math.remainder(wanted - facing, 2 * math.pi)
+        seconds = abs(turn) / self.robot.turn_rate
+        if turn and self.world.keeps_history:
+            motion = stand(self.place, self.storey, turn, seconds)
+            self.recorder.add(float(self.world.clock.now), motion, self.status, errand.index)
+        if turn and takes_time:
+            yield from self.rest(seconds)
+        self.heading = wanted
 
     def enter(self, stretch: Stretch, errand: Errand) -> Step:
         """Get hold of what a stretch needs, and let go of what it does not; answer whether it may be entered."""

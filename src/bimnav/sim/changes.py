@@ -90,6 +90,8 @@ class TargetReported:
         Index of the storey.
     global_id
         Its identity; the name if it has none.
+    priority
+        What matters more is done before it, and what matters less behind it.
     """
 
     time: float
@@ -98,6 +100,7 @@ class TargetReported:
     y: float
     storey: int = 0
     global_id: str = ""
+    priority: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -142,7 +142,7 @@ def _stop_for(change: TargetReported, global_id: str, world: World) -> tuple[Sto
     except BimnavError as error:
         return None, error.message
     point = (change.x, change.y, graph.frame.elevations[change.storey])
-    target = Target(global_id, change.name, change.storey, point, None, "user", "reported")
+    target = Target(global_id, change.name, change.storey, point, None, "user", "reported", priority=change.priority)
     found = stop_for(graph, target, cell, None)
     return (found, "") if isinstance(found, Stop) else (None, found.reason)
 

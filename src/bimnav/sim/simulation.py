@@ -297,23 +297,29 @@ def _slow_doors(environment: IndoorEnvironment | None) -> list[SimDoor]:
 
 
 def _lifts_in(graph: NavGraph) -> tuple[Lift, ...]:
-    """Return the lifts of a graph, as fast as it reckons with; each waits on the lowest storey it serves."""
+    """Return the lifts of a graph, as fast as it reckons with; each waits on the lowest storey it serves.
+
+    What a link takes beside the way to the cabin and out of it is the cabin's: travel, and a stop at both ends.
+    """
     found: dict[str, Lift] = {}
     for link in sorted(getattr(graph, "connectors", ()), key=lambda link: min(link.begin, link.end)):
-        if link.kind == "lift" and len(link.points) and (link.global_id or link.name) not in found:
-            rising = np.abs(np.diff(link.points[:, 2])).argmax()
-            x, y, _ = link.points[rising].tolist()
-            climb = abs(float(link.points[-1, 2] - link.points[0, 2]))
-            storeys = abs(link.end.storey - link.begin.storey)
-            stops = max((link.seconds or 0.0) - climb / _LIFT_SPEED, 0.0) / 2
-            found[link.global_id or link.name] = Lift(
-                link.global_id or link.name,
-                x,
-                y,
-                travel_time=climb / _LIFT_SPEED / storeys,
-                door_time=stops,
-                storey=min(link.begin.storey, link.end.storey),
-            )
+        name = link.global_id or link.name or f"lift at {tuple(link.begin)}"
+        if link.kind != "lift" or name in found:
+            continue
+        ends = np.array([graph.frame.center_of(link.begin), graph.frame.center_of(link.end)])
+        points = link.points if len(link.points) else ends
+        x, y, _ = points[np.abs(np.diff(points[:, 2])).argmax()].tolist()
+        climb, storeys = abs(float(ends[1, 2] - ends[0, 2])), abs(link.end.storey - link.begin.storey)
+        seconds = max(graph.seconds_over(link) - graph.seconds_beside(link), 0.0)
+        travel = min(climb / _LIFT_SPEED, seconds)
+        found[name] = Lift(
+            name,
+            x,
+            y,
+            travel_time=travel / storeys,
+            door_time=(seconds - travel) / 2,
+            storey=min(link.begin.storey, link.end.storey),
+        )
     return tuple(found.values())
 
 

@@ -449,6 +449,7 @@ class World:
     def assign(self, stop: Stop, *, besides: RobotAgent | None = None, cause: str = "") -> bool:
         """Give a stop to the robot that gets there with the shortest detour; answer whether one can.
 
+        It comes behind what matters more and before what matters less, but for what a robot is on its way to.
         Of several equally short detours the first robot's, and its earliest, is taken.
         """
         best: tuple[float, int, int] | None = None
@@ -461,6 +462,8 @@ class World:
                 continue
             field = distance_field(graph, stop.cell)
             for position, detour in self._detours(agent, graph, field):
+                if not _is_in_turn(agent, stop, position):
+                    continue
                 if math.isfinite(detour) and (best is None or detour < best[0] - JOINED):
                     best = detour, agent.index, position
         if best is None:
@@ -601,6 +604,14 @@ class World:
         cell = Cell(*(int(k) for k in np.unravel_index(nearest, distance.shape)))
         end = graph.frame.center_of(cell)
         return Errand(None, cell, end, leg=way_between(graph, agent.place, begin, cell, end))
+
+
+def _is_in_turn(agent: RobotAgent, stop: Stop, position: int) -> bool:
+    """Tell whether a stop at some place of an agenda keeps the order of priorities."""
+    first = 1 if agent.agenda and agent.status is not RobotStatus.IDLE else 0
+    known = [(k, e.stop.priority) for k, e in enumerate(agent.agenda) if e.stop is not None and e.stop.kind == "target"]
+    before = all(priority >= stop.priority for k, priority in known if first <= k < position)
+    return before and all(priority <= stop.priority for k, priority in known if k >= position)
 
 
 def _reach(field: NDArray[np.float64], cell: Cell | None) -> float:
