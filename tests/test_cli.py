@@ -192,3 +192,33 @@ def test_every_help_text_has_examples_and_explains_every_option(command, capsys)
     assert all(line.strip().startswith("bimnav ") for line in examples[:2])
     for option in re.findall(r"^  (--\S+.*(?:\n {10,}.*)*)", text, re.MULTILINE):
         assert re.search(r"\S(?: {2,}|\n +)\S", option), f"nothing is said of {option}"
+
+
+def test_names_of_any_kind_are_shown_as_they_are_and_break_nothing(capsys, tmp_path):
+    names = [r"$\frac{$", "a\nb\x1b[31m", "漏水", "<b>"]
+    arguments = [word for name in names for word in ("--target", f"{name}@2,16")]
+    assert main(["run", APARTMENT, *arguments, "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr()
+    assert r"a\nb\x1b[31m at (2.000, 16.000)" in printed.out
+    assert "\x1b" not in printed.out
+    assert printed.err == ""
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "plan.png", "route.csv", "events.csv", "report.json", "replay.html",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("wrong", [["--seed", "-5"], ["--out", ""]])
+def test_what_cannot_be_used_is_one_line_before_anything_is_read(wrong, capsys):
+    assert main(["run", "no such file.ifc", *wrong]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert wrong[0].lstrip("-") in printed.err
+
+
+def test_targets_with_one_reason_share_a_line(capsys):
+    house = str(real_model("houses/231110AC11-FZK-Haus-IFC.ifc"))
+    assert main(["run", house, "--task", "inspection_building", "--radius", "0.3", "--cell", "0.2"]) == 3
+    told = [line for line in capsys.readouterr().out.splitlines() if "not served" in line]
+    assert any(" and " in line and line.split(": ")[1].endswith(" more") for line in told)
+    assert len({line.split(": ", 2)[2] for line in told}) == len(told)

@@ -378,6 +378,7 @@ def _played(job: _Job, settings: Row) -> Row:
     """Plan and play one scenario."""
     from bimnav.plan import plan_tour, plan_tours
     from bimnav.sim import simulate
+    from bimnav.sim.chance import seeded
 
     one = replace(job.robot, speed=settings["speed"])
     count = settings["robots"]
@@ -391,7 +392,7 @@ def _played(job: _Job, settings: Row) -> Row:
             plan = plan_tours(job.graph, _around(job.graph, job.start, fleet), job.stops, robots=fleet, chargers=())
             length = plan.length
         lost = len(plan.unreached) + len(job.unreached)
-        result = simulate(plan, robots=fleet, rng=np.random.default_rng(settings["seed"]), **job.options)
+        result = simulate(plan, robots=fleet, rng=seeded(settings["seed"]), **job.options)
     except BimnavError as error:
         return _not_played(settings, error)
     metrics = result.metrics

@@ -1,11 +1,12 @@
-"""Sentences about one thing or many."""
+"""Sentences about one thing or many, and names that others gave."""
 
 from __future__ import annotations
 
 import re
 
-__all__ = ["counted"]
+__all__ = ["counted", "printable"]
 
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")  # what breaks a line, a terminal or UTF-8
 _EITHER = re.compile(r"\[([^][|]*)\|([^][|]*)\]")
 
 
@@ -16,3 +17,12 @@ def counted(message: str, number: int) -> str:
     ('1 room has no door.', '2 rooms have no door.')
     """
     return _EITHER.sub(r"\1" if number == 1 else r"\2", message).replace("{n}", str(number))
+
+
+def printable(name: str) -> str:
+    r"""Return a name with its line ends and control characters as escapes, so that it stays on its line.
+
+    >>> printable("Chair\x1b[31m")
+    'Chair\\x1b[31m'
+    """
+    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), name)

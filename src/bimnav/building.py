@@ -388,8 +388,15 @@ class Detection:
     ifc_class: str = "IfcBuildingElementProxy"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "x", float(self.x))
-        object.__setattr__(self, "y", float(self.y))
+        try:
+            self.name.encode()
+            object.__setattr__(self, "x", float(self.x))
+            object.__setattr__(self, "y", float(self.y))
+        except (AttributeError, TypeError, ValueError) as error:  # of what is no text, in no encoding, no number
+            raise ValueRangeError(
+                f"target {self.name!r:.80} at ({self.x!r:.40}, {self.y!r:.40}) cannot be read.",
+                "Give a name in UTF-8, then x and y in metres.",
+            ) from error
         numbers = {"x": self.x, "y": self.y}
         if self.z is not None:
             numbers["z"] = self.z
@@ -670,10 +677,14 @@ class Building:
         """
         added = []
         for target in targets:
-            if isinstance(target, Mapping):
-                target = Detection(**target)
-            elif not isinstance(target, Detection):
-                target = Detection(*target)
+            try:
+                if isinstance(target, Mapping):
+                    target = Detection(**target)
+                elif not isinstance(target, Detection):
+                    target = Detection(*target)
+            except TypeError as error:
+                hint = "Give a Detection, or its name, x and y."
+                raise ValueRangeError(f"{target!r:.80} is no target.", hint, {"target": target}) from error
             if target.storey is not None:
                 self.storey_index(target.storey)
             added.append(target)

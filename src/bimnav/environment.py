@@ -18,7 +18,7 @@ from bimnav._floors import FLOOR_SOURCES, NEAR, FloorSource, find_floors, outlin
 from bimnav._meaning import what_blocks
 from bimnav._sight import LIFTED, UNDER, sight_of
 from bimnav.building import Building, Detection, Element, Issue, Space, Storey
-from bimnav.errors import ValueRangeError
+from bimnav.errors import InputError, ValueRangeError
 from bimnav.footprint import Footprint, footprints_of, merge_footprints
 from bimnav.robot import Robot
 
@@ -372,9 +372,16 @@ def make_environment(
         Whether the ground around the building is floor too: slabs and terrain as high as a level, else a
         margin of two metres around the lowest level with a door to the outside.
     """
-    from bimnav.tasks import choose, lint_rules
+    from bimnav.tasks import Task, choose, lint_rules
 
     robot = robot or Robot()
+    for name, value, kind, maker in (
+        ("building", building, Building, "read_ifc"),
+        ("task", task, Task, "load_task"),
+        ("robot", robot, Robot, "Robot or load_robot"),
+    ):
+        if not isinstance(value, kind):
+            raise InputError(f"{name} is {value!r:.80}, not a {kind.__name__}.", f"Make it with {maker}.")
     floors, issues = find_floors(building, robot, sources=floor_from, outdoors=outdoors)
     issues += lint_rules(task, building)
     levels = tuple(floor.level for floor in floors)

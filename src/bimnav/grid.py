@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -221,10 +221,11 @@ class GridFrame:
         return col * d, row * d, (col + 1) * d, (row + 1) * d
 
 
-def _check_cell_size(cell_size: float) -> None:
-    if not (math.isfinite(cell_size) and cell_size >= 1e-3):
+def _check_cell_size(cell_size: Any) -> None:
+    is_number = isinstance(cell_size, (float, int, np.floating, np.integer))
+    if not (is_number and math.isfinite(cell_size) and cell_size >= 1e-3):
         raise ValueRangeError(
-            f"cell size is {cell_size}.",
+            f"cell size is {cell_size!r}.",
             "Give metres, at least 0.001; common sizes are 0.3048 (1 ft), 0.1 and 0.05.",
             {"cell_size": cell_size},
         )

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 import shapely
 
 from bimnav._lost import Lost, refuse_lost, with_boxes
@@ -17,6 +16,7 @@ from bimnav.building import Building, Detection
 from bimnav.environment import IndoorEnvironment, Place, make_environment
 from bimnav.errors import (
     NoTargetError,
+    OutputError,
     OutsideMapError,
 )
 from bimnav.graph import NavGraph, build_graph
@@ -123,8 +123,12 @@ def run(
     from bimnav.ifc import read_ifc
     from bimnav.plan import plan_tour
     from bimnav.sim import simulate
+    from bimnav.sim.chance import seeded
     from bimnav.tasks import load_task
 
+    rng = seeded(seed)
+    if out is not None and not str(out):
+        raise OutputError("out names no folder.", "Name one, or leave it out to write nothing.", {"out": ""})
     loaded = load_task(str(task)) if isinstance(task, (str, Path)) else task
     building = model if isinstance(model, Building) else read_ifc(model, progress=progress)
     building = with_boxes(building.with_targets(targets), lost)
@@ -148,7 +152,7 @@ def run(
     tour = plan_tour(graph, begin.cell, start_point=begin.point, return_to_start=return_to_start)
     refuse_lost(tour, lost)
     tour, check = _checked(tour)
-    result = simulate(tour, rng=np.random.default_rng(seed))
+    result = simulate(tour, rng=rng)
     mission = Mission(building, loaded, environment, tour.graph, begin, tour, check, result)
     return mission if out is None else write_mission(mission, Path(out))
 

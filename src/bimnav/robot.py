@@ -113,9 +113,11 @@ class Robot:
     abilities: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not _is_text(self.name):
+            self._refuse("name", self.name, "Give a text.")
         for field, (low, high) in _RANGES.items():
             value = getattr(self, field)
-            if value is not None and not low <= value <= high:
+            if value is not None and not _is_within(value, low, high):
                 self._refuse(field, value, f"Give a number from {low:g} to {high:g}.")
         if self.step_height >= self.height:
             raise ValueRangeError(
@@ -167,3 +169,14 @@ class Robot:
             self._refuse("radius", self.radius, f"The outline reaches {reach:g} m from the point the robot turns on.")
         object.__setattr__(self, "outline", outline if polygon.exterior.is_ccw else outline[::-1])
         object.__setattr__(self, "radius", max(self.radius, reach))
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _is_within(value: Any, low: float, high: float) -> bool:
+    try:
+        return bool(low <= value <= high)
+    except (TypeError, ValueError):  # not a number
+        return False

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 import bimnav as bn
+from bimnav._wording import printable
 from bimnav.cli import _cache, _doctor, _inspect, _robots, _run, _tasks
 from bimnav.cli._shared import BAD_INPUT, BUG, DONE, INTERRUPTED
 from bimnav.errors import BimnavError, UnsafePlanError
@@ -43,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command: Callable[[argparse.Namespace], int] = options.command
         return command(options)
     except BimnavError as error:
-        print(f"bimnav: {error.code} {error}", file=sys.stderr)  # noqa: T201
+        print("\n".join(map(printable, f"bimnav: {error.code} {error}".split("\n"))), file=sys.stderr)  # noqa: T201
         return BUG if isinstance(error, UnsafePlanError) else BAD_INPUT
     except KeyboardInterrupt:
         print("bimnav: stopped", file=sys.stderr)  # noqa: T201

@@ -105,5 +105,8 @@ def _readiness_summary(ready: bn.Readiness) -> str:
         for storey in ready.storeys
         if storey.floor_area
     ]
-    lines += [f"  not reached: {room.name} ({room.global_id}): {room.detail} {room.hint}" for room in ready.unreached]
+    lines += [
+        f"  not reached: {room.name} ({room.global_id}): {room.detail.rstrip('.')}. {room.hint}"
+        for room in ready.unreached
+    ]
     return "\n".join(lines)

@@ -7,12 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import bimnav as bn
+from bimnav._wording import printable
 from bimnav.cli._shared import DONE, INCOMPLETE, length, place, show, show_json, target
 from bimnav.detections import read_targets
 
 if TYPE_CHECKING:
     from bimnav.cli._shared import Commands
 
+_NAMED = 3  # of the targets that share a reason; the report lists them all
 _EXAMPLES = """\
 examples:
   bimnav run apartment.ifc --task cleaning --cell 0.5ft --out out
@@ -127,7 +129,7 @@ def _summary(report: dict[str, Any], *, is_point: bool) -> str:
         target = by_id[global_id]
         aside = f", from {target['distance']:.2f} m away" if target["approach"] == "standing" else ""
         x, y, _ = target["destination"]
-        lines.append(f"           {target['name']} at ({x:.3f}, {y:.3f}){aside}")
+        lines.append(f"           {printable(target['name'])} at ({x:.3f}, {y:.3f}){aside}")
     proved = "proved shortest" if tour["is_optimal"] else f"at least {tour['lower_bound']:.2f} m is needed"
     lines.append(f"  tour     {tour['length']:.2f} m along the cells, {proved}")
     lines.append(f"  time     {report['simulation']['makespan']:.1f} s, {tour['duration']:.1f} s of it on the move")
@@ -137,12 +139,24 @@ def _summary(report: dict[str, Any], *, is_point: bool) -> str:
         + ("" if clearance is None else f"; nearest is {clearance:.3f} m away")
     )
     for conflict in report["conflicts"]:
-        names = ", ".join(o["name"] for o in conflict["obstacles"])
-        lines.append(f"  conflict {conflict['name']} shares cell {tuple(conflict['cell'])} with {names}")
-    lines += [f"  not served: {t['name']}: {t['reason']}" for t in report["targets"] if not t["reached"]]
+        names = ", ".join(printable(o["name"]) for o in conflict["obstacles"])
+        lines.append(f"  conflict {printable(conflict['name'])} shares cell {tuple(conflict['cell'])} with {names}")
+    lines += [f"  not served: {names}: {reason}" for reason, names in _not_served(report).items()]
     grave = [issue for issue in report["issues"] if issue["severity"] != "info"]
     lines += [f"  {issue['severity']}: {issue['message']}" for issue in grave]
     if is_point:
         lines.append("  robot    a point, as in the paper; --radius and --height give it a body")
     lines += [f"  wrote    {path}" for path in report["files"]]
     return "\n".join(lines)
+
+
+def _not_served(report: dict[str, Any]) -> dict[str, str]:
+    """Return who shares a reason for not being served: a few by name, and how many more."""
+    names: dict[str, list[str]] = {}
+    for one in report["targets"]:
+        if not one["reached"]:
+            names.setdefault(one["reason"], []).append(printable(one["name"]))
+    return {
+        reason: ", ".join(shared[:_NAMED]) + (f" and {len(shared) - _NAMED} more" if len(shared) > _NAMED else "")
+        for reason, shared in names.items()
+    }

@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from bimnav._wording import printable
 from bimnav.detections import parse_length, parse_place, parse_target
 from bimnav.errors import BimnavError
 
@@ -33,8 +34,9 @@ target = argument(parse_target, "target")
 
 
 def show(text: str) -> None:
-    print(text)  # noqa: T201
+    """Print lines; what else would move the cursor of a terminal, or has no place in UTF-8, becomes an escape."""
+    print("\n".join(map(printable, text.split("\n"))))  # noqa: T201
 
 
 def show_json(value: Any) -> None:
-    show(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    print(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False).encode(errors="replace").decode())  # noqa: T201

@@ -78,7 +78,11 @@ def read_ifc(
     from bimnav.ifc._text import digest
     from bimnav.ifc._watch import Limits
 
-    wanted = [Path(path) for given in paths for path in ([given] if isinstance(given, (str, PathLike)) else given)]
+    try:
+        wanted = [Path(path) for given in paths for path in ([given] if isinstance(given, (str, PathLike)) else given)]
+    except TypeError as error:
+        told = ", ".join(f"{given!r:.80}" for given in paths)
+        raise InputError(f"read_ifc was given {told}, which is no path.", "Give the path of an IFC file.") from error
     if not wanted:
         raise InputError("read_ifc was given no file.", "Give the path of an IFC file.")
     limits = Limits() if timeout is None else Limits(timeout=timeout)

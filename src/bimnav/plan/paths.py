@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -310,7 +311,11 @@ def _length(graph: NavGraph, indices: NDArray[np.int32]) -> float:
 
 
 def _index(graph: NavGraph, cell: Cell, role: str) -> int:
-    storey, row, col = cell
+    try:
+        storey, row, col = map(operator.index, cell)
+    except (TypeError, ValueError) as error:
+        hint = "Give a Cell; `graph.frame.cell_at(x, y)` finds the one at a point."
+        raise InputError(f"{role} is {cell!r}, which is no cell.", hint, {role: cell}) from error
     storeys, rows, cols = graph.cost.shape
     if not (0 <= storey < storeys and 0 <= row < rows and 0 <= col < cols):
         raise OutsideMapError(

@@ -16,6 +16,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from bimnav._cards import ROBOTS
+from bimnav._wording import printable
 from bimnav.errors import ValueRangeError
 from bimnav.graph import NavGraph, NodeKind
 
@@ -45,6 +46,7 @@ __all__ = [
     "finish",
     "parts_at",
     "patches_of",
+    "plain",
     "shown_box",
     "unit_for",
 ]
@@ -79,6 +81,11 @@ WALLS = ("IfcWall", "IfcCurtainWall", "IfcWindow", "IfcColumn", "IfcPlate", "Ifc
 _LETTER = 0.008  # width of a letter, as a share of the width of a plan
 _METRES_PER_FOOT = 0.3048
 DOTS_PER_INCH = 200
+
+
+def plain(name: str) -> str:
+    """Return a name as text that figures show as it is: dollars begin no formula, control characters are escapes."""
+    return printable(name).replace("$", r"\$")
 
 
 def axes_for(ax: Axes | None, bounds: Sequence[float]) -> Axes:
@@ -137,7 +144,7 @@ def finish(ax: Axes, bounds: Sequence[float], unit: Unit) -> None:
 
 def add_key(ax: Axes, handles: Sequence[Any], names: Sequence[str] = ()) -> None:
     """Put the key, and a numbered list of names, at the right of the axes."""
-    blank = [Line2D([], [], linestyle="none", label=name) for name in names]
+    blank = [Line2D([], [], linestyle="none", label=plain(name)) for name in names]
     ax.legend(
         handles=[*handles, *blank],
         loc="upper left",
@@ -245,7 +252,7 @@ def draw_names(ax: Axes, rooms: Sequence[tuple[str, BaseGeometry]]) -> None:
         if len(name) * letter > 1.3 * (x1 - x0) or 2 * letter > y1 - y0:
             continue
         x, y = polygon.representative_point().coords[0]
-        text = ax.text(x, y, name, color="#6f6a5d", fontsize=6.5, style="italic", ha="center", zorder=5)
+        text = ax.text(x, y, plain(name), color="#6f6a5d", fontsize=6.5, style="italic", ha="center", zorder=5)
         text.set_clip_on(True)
         text.set_path_effects([withStroke(linewidth=2, foreground="white")])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,7 @@ from bimnav.plot._drawing import (
     finish,
     parts_at,
     patches_of,
+    plain,
     shown_box,
     unit_for,
 )
@@ -119,7 +121,7 @@ def plot_building(
     ax.add_collection(patches_of(stairs, facecolor="#efe3c8", **edge))
     ax.add_collection(patches_of(walls, facecolor=COLORS["wall"], edgecolor="none", zorder=4))
     draw_names(ax, [(space.label, part.polygon) for space, part in rooms])
-    ax.set_title(f"{building.name}, {building.storeys[index].name}", fontsize=10)
+    ax.set_title(plain(f"{building.name}, {building.storeys[index].name}"), fontsize=10)
     finish(ax, bounds, unit_for(building.unit, unit))
     key = [Patch(color=COLORS["wall"], label="wall, window, column")]
     key += [Patch(facecolor=COLORS["furniture"], edgecolor="#6b6459", label="other element")] if others else []
@@ -171,7 +173,7 @@ def plot_field(
         ax.contour(xs, ys, values, levels=8, colors="white", linewidths=0.5, alpha=0.7, zorder=1)
     if graph.environment is not None:
         draw_elements(ax, graph.environment, storey)
-        ax.set_title(graph.environment.storeys[storey].name, fontsize=10)
+        ax.set_title(plain(graph.environment.storeys[storey].name), fontsize=10)
     finish(ax, bounds, unit_for(graph.environment, unit))
     bar = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02)
     bar.set_label(label, fontsize=8)
@@ -213,7 +215,7 @@ def plot_fleet(
             if stop.cell.storey == storey:
                 draw_mark(ax, stop.end, str(number), color)
         said = f"{robot.name}: {len(tour.stops)} stops, {tour.length:.1f} m"
-        key.append(Line2D([], [], color=color, linewidth=1.8, marker="s", label=said))
+        key.append(Line2D([], [], color=color, linewidth=1.8, marker="s", label=plain(said)))
     legend = ax.get_legend()
     add_key(ax, [*(legend.legend_handles if legend else ()), *key])
     return ax
@@ -244,7 +246,7 @@ def plot_environment(
     targets = [target for target in environment.targets if target.storey == storey]
     for number, target in enumerate(targets, 1):
         draw_mark(ax, target.destination, str(number), COLORS["target"])
-    ax.set_title(environment.storeys[storey].name, fontsize=10)
+    ax.set_title(plain(environment.storeys[storey].name), fontsize=10)
     finish(ax, bounds, unit_for(environment, unit))
     add_key(ax, key, [f"{number}  {target.name}" for number, target in enumerate(targets, 1)])
     return ax
@@ -270,7 +272,7 @@ def plot_graph(graph: NavGraph, *, storey: int | None = None, ax: Axes | None = 
     key = draw_cells(ax, graph, storey)
     if graph.environment is not None:
         key += draw_elements(ax, graph.environment, storey)
-        ax.set_title(graph.environment.storeys[storey].name, fontsize=10)
+        ax.set_title(plain(graph.environment.storeys[storey].name), fontsize=10)
     finish(ax, bounds, unit_for(graph.environment, unit))
     add_key(ax, key)
     return ax
@@ -345,7 +347,9 @@ def figure_bytes(draw: Callable[[Axes], object], *, size: tuple[float, float] = 
         FigureCanvasAgg(figure)
         draw(figure.add_subplot())
         buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", bbox_inches="tight", pad_inches=0.15, metadata={"Software": None})
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph .* missing from font")  # the report holds such names, too
+            figure.savefig(buffer, format="png", bbox_inches="tight", pad_inches=0.15, metadata={"Software": None})
     return buffer.getvalue()
 
 

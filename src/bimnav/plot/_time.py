@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Patch
 
 from bimnav._files import write_bytes
 from bimnav.errors import InputError, MissingExtraError, ValueRangeError
-from bimnav.plot._drawing import ROBOTS, STATUSES, add_key, shown_box
+from bimnav.plot._drawing import ROBOTS, STATUSES, add_key, plain, shown_box
 from bimnav.plot._plans import plot_graph
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def plot_timeline(result: SimResult, *, ax: Axes | None = None) -> Axes:
         served = [event for event in result.log if event.robot == robot.name and event.event == "end_service"]
         for number, event in enumerate(served, 1):
             ax.text(event.time, row - 0.42, str(number), fontsize=6.5, ha="center", va="bottom")
-    ax.set_yticks(range(len(result.robots)), [robot.name for robot in result.robots], fontsize=8)
+    ax.set_yticks(range(len(result.robots)), [plain(robot.name) for robot in result.robots], fontsize=8)
     ax.invert_yaxis()
     ax.set_xlabel("time (s)")
     ax.set_xlim(*result.span)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from bimnav.errors import ValueRangeError
 
-__all__ = ["Chance", "Unit"]
+__all__ = ["Chance", "Unit", "seeded"]
 
 Unit: TypeAlias = Literal["s", "min", "h", "m/s", "km/h"]
 Shape: TypeAlias = Literal["uniform", "normal", "lognormal", "triangular", "exponential"]
@@ -102,3 +103,14 @@ class Chance:
     def __call__(self, *arguments: Any) -> float:
         """Draw with the last argument, a generator; so a chance is a service time or a speed."""
         return self.draw(arguments[-1])
+
+
+def seeded(seed: int) -> np.random.Generator:
+    """Return a generator of random numbers for a seed, a whole number of at least 0."""
+    try:
+        number = operator.index(seed)
+    except TypeError:
+        number = -1
+    if number < 0:
+        raise ValueRangeError(f"seed is {seed!r}.", "Give a whole number of at least 0.", {"seed": seed})
+    return np.random.default_rng(number)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeAlias
 
 from bimnav._files import write_text
+from bimnav._wording import printable
 from bimnav.errors import MissingExtraError
 from bimnav.sim.track import RobotStatus
 
@@ -52,7 +52,6 @@ EventKind: TypeAlias = Literal[
     "end",
 ]
 
-_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")  # what breaks a line, a terminal or UTF-8
 _LIVE = tuple("=+-@\t\r")  # a spreadsheet takes a cell that begins like this for a formula
 
 
@@ -205,5 +204,5 @@ def _cell(value: float | str | None) -> str:
         return ""
     if not isinstance(value, str):
         return f"{round(value, 6) + 0.0:.6f}"  # the sum turns -0.0 into 0.0
-    text = _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), value)
+    text = printable(value)
     return f"'{text}" if text.startswith(_LIVE) else text
