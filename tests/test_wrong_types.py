@@ -65,3 +65,20 @@ def test_what_is_no_target_is_refused(target):
     building = bn.Building("house", (bn.Storey("G", "Ground", 0.0),))
     with pytest.raises(InputError, match="target"):
         building.with_targets([target])
+
+
+@pytest.fixture(scope="module")
+def apartment():
+    return bn.make_environment(bn.read_ifc(bn.sample("apartment")), bn.load_task("cleaning"))
+
+
+@pytest.mark.parametrize("place", ["abc", (1,), 5, ("x", 2), (None, None), (np.inf, 2)])
+def test_what_is_no_place_is_refused(apartment, place):
+    graph = bn.build_graph(apartment, cell_size=0.3048)
+    with pytest.raises(InputError, match=r"no place|not a point"):
+        bn.find_start(graph, place)
+
+
+def test_a_study_without_robots_is_refused(apartment):
+    with pytest.raises(InputError, match="robots"):
+        bn.study(apartment, starts=[(3.1, 15.9)], robots=[1, 0])

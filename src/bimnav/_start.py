@@ -120,10 +120,10 @@ def _nearest_free(
 
 def _start_at(graph: NavGraph, place: Place) -> Start:
     environment = _environment_of(graph)
+    storey = environment.storeys_at(place)[0]
     x, y = float(place[0]), float(place[1])
     named = place[2] if len(place) > 2 else None
     point = shapely.Point(x, y)
-    storey = environment.storeys_at(place)[0]
     on_floor = environment.floor(storey).intersects(point)
     blocked = any(body.intersects(point) for _, body in environment.bodies_on(storey))
     where = f"start ({x:g}, {y:g})" + (f" on {named}" if named is not None else "")

@@ -251,6 +251,8 @@ def study(
     empty = [name for name, values in lists.items() if not values]
     if empty:
         raise InputError(f"there is no {', no '.join(empty)} to try.", "Give at least one of each setting.")
+    if min(lists["robots"]) < 1:
+        raise ValueRangeError(f"{min(lists['robots'])} robots do nothing.", "Give at least one.")
     grid = [
         dict(zip(lists, combination, strict=True)) | {"closed_doors": " ".join(combination[4])}
         for combination in itertools.product(*lists.values())

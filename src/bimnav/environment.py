@@ -273,9 +273,13 @@ class IndoorEnvironment:
             of one level of it, such as `Level 1 (+1.50 m)`. Best are storeys with floor there, then those
             with an obstacle there, then the lowest walkable one.
         """
-        if not all(math.isfinite(float(value)) for value in place[:2]):
-            raise ValueRangeError(f"({place[0]}, {place[1]}) is not a point.", "Give finite metres.")
-        point = shapely.Point(*place[:2])
+        try:
+            x, y = (float(value) for value in place[:2])
+        except (TypeError, ValueError) as error:
+            raise ValueRangeError(f"{place!r:.80} is no place.", "Give (x, y) or (x, y, storey).") from error
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise ValueRangeError(f"({x}, {y}) is not a point.", "Give finite metres.")
+        point = shapely.Point(x, y)
         storeys: Sequence[int] = range(len(self.levels))
         if len(place) > 2 and place[2] is not None:
             split = [s for s in storeys if self.storeys[s] not in self.building.storeys]
