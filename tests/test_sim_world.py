@@ -152,6 +152,60 @@ def test_nobody_enters_a_narrow_passage_while_another_is_in_it():
     assert max(map(len, inside)) == 1
 
 
+SMOOTH = Robot("A", speed=1.0, acceleration=0.5)
+
+
+@pytest.mark.parametrize("more", [{"passages": [NARROW]}, {"doors": [SimDoor("d", "open", 3.0, polygon=DOOR.polygon)]}])
+def test_a_robot_drives_through_what_is_free_without_slowing_down(more):
+    free, shared = simulate(STRAIGHT, robot=SMOOTH), simulate(STRAIGHT, robot=SMOOTH, **more)
+    assert shared.makespan == free.makespan == 12.0  # 2 s and 1 m each to start and to stop
+    assert shared.log.rows == free.log.rows
+    moments = np.linspace(0, 12, 50)
+    np.testing.assert_allclose(shared.track.points_at(moments), free.track.points_at(moments), atol=1e-9)
+
+
+def test_a_robot_that_finds_a_passage_in_use_stops_in_front_of_it_and_another_enters_as_soon_as_it_is_left():
+    there = tour_along([(0, 0, 0), (10, 0, 0)], stops=(stop_at((10, 0, 0), "east"),))
+    back = tour_along([(10, 0, 0), (0, 0, 0)], stops=(stop_at((0, 0, 0), "west"),))
+    result = simulate(
+        [there, back],
+        robots=[SMOOTH, Robot("B", speed=1.0, acceleration=0.5)],
+        passages=[NARROW],
+        start_time=[0.0, 1.0],
+    )
+    (wait,) = rows(result, "wait")
+    # A is at 3 m after 4 s; B would begin to brake at 8 m, a metre before the passage, after 1 + 3 s
+    assert (wait.robot, wait.time, wait.x) == ("B", pytest.approx(5.0 + 1.0, abs=1e-5), pytest.approx(7.0, abs=1e-5))
+    (go,) = rows(result, "resume")
+    assert go.time == pytest.approx(8.0, abs=1e-5)  # A has left at 7 m
+    assert result.makespan == pytest.approx(8.0 + 7 + 2, abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_two_robots_that_start_and_brake_slowly_are_never_in_one_passage(seed):
+    rng = np.random.default_rng(seed)
+    parts = [Passage("w", shapely.box(8, -1, 14, 11)), Passage("m", shapely.box(14, -1, 17, 11)),
+             Passage("e", shapely.box(25, -1, 26, 11))]  # fmt: skip
+    goals = [[Cell(0, int(r), int(c)) for r, c in rng.integers((10, 40), size=(5, 2))] for _ in range(3)]
+    tours = [tour_in(HALL, goals[k][0], *goals[k][1:], prefix=f"{k}-") for k in range(3)]
+    fleet = [
+        Robot(f"R{k}", speed=float(rng.uniform(0.5, 2)), acceleration=float(rng.uniform(0.2, 1)), turn_rate=1.0)
+        for k in range(3)
+    ]
+    result = simulate(tours, robots=fleet, passages=parts, people=[Person("p")] * (seed % 2), service_time=2.0)
+    moments = np.arange(result.span[0], result.span[1], 0.05)
+    places = [shapely.points(track.points_at(moments)[:, :2]) for track in result.tracks]
+    for part in parts:
+        inside = sum(shapely.contains(part.polygon.buffer(-1e-5), place).astype(int) for place in places)
+        started_inside = [part.polygon.contains(shapely.Point(tour.start_point)) for tour in tours]
+        if not any(started_inside):
+            assert inside.max() <= 1
+    for track, robot in zip(result.tracks, fleet, strict=True):
+        speeds = np.linalg.norm(np.diff(track.points_at(moments), axis=0), axis=1) / 0.05
+        assert speeds.max() <= robot.speed + 1e-6
+        assert np.abs(np.diff(speeds)).max() <= robot.acceleration * 0.05 * 2 + 1e-6
+
+
 def test_a_robot_that_works_in_a_passage_keeps_it():
     works = tour_along([(0, 0, 0), (5, 0, 0)], [(5, 0, 0), (10, 0, 0)])
     other = tour_along([(10, 1, 0), (0, 1, 0)], stops=(stop_at((0, 1, 0), "west"),))

@@ -20,11 +20,11 @@ from bimnav.sim.knowledge import Closure
 from bimnav.sim.log import EventKind, new_event
 from bimnav.sim.motion import Motion, drive, rest, stand
 from bimnav.sim.routes import JOINED, Legs, Line, end_of, legs_of
+from bimnav.sim.stretches import Gate, Stretch, gates_of
 from bimnav.sim.track import RobotStatus, TrackRecorder
 
 if TYPE_CHECKING:
     from bimnav.plan import Tour
-    from bimnav.sim.stretches import Stretch
     from bimnav.sim.world import World
     from bimnav.stops import Stop, Unreached
 
@@ -93,6 +93,7 @@ class RobotAgent:
         self.storey = tour.start.storey
         self.heading: float | None = None
         self.leg_distance = self.distance = self.charge_distance = 0.0
+        self.driven = 0.0  # metres in the last motion
         self.battery = Battery(robot)
         self.name, self.tires = robot.name, math.isfinite(robot.battery_wh)
         self.recorder = TrackRecorder()
@@ -372,19 +373,21 @@ class RobotAgent:
         elif before is not RobotStatus.MOVING:
             self.note("resume", errand.stop)
         stretches = self.world.stretches(self, leg)
-        for k, stretch in enumerate(stretches):
-            if len(stretches) > 1 or self.held or stretch.needs:
-                entered = yield from self.enter(stretch, errand)
+        while stretches:
+            if len(stretches) > 1 or self.held or stretches[0].needs:
+                entered = yield from self.enter(stretches[0], errand)
                 if not entered:
-                    errand.leg = _joined(stretches[k:])
+                    errand.leg = _joined(stretches)
                     return False
-            if stretch.lift is not None:
-                yield from self.ride(stretch, errand)
+            ahead = 1 if stretches[0].lift is not None else self.world.passable(self, stretches)
+            group, stretches = stretches[:ahead], stretches[ahead:]
+            if group[0].lift is not None:
+                yield from self.ride(group[0], errand)
                 done = True
             else:
-                done = yield from self.move(stretch, stretches[k + 1 :], errand)
-            if not done or (self.orders and k + 1 < len(stretches)):
-                errand.leg = _joined(stretches[k + 1 :]) if done else self.line
+                done = yield from self.move(group, stretches, errand)
+            if not done or (self.orders and stretches):
+                errand.leg = _joined(stretches) if done else self.line
                 return False
         self.avoided = None
         errand.leg = None
@@ -419,9 +422,7 @@ class RobotAgent:
     def enter(self, stretch: Stretch, errand: Errand) -> Step:
         """Get hold of what a stretch needs, and let go of what it does not; answer whether it may be entered."""
         claims = self.world.claims
-        if self.held - stretch.needs:
-            left, self.held = sorted(self.held - stretch.needs), self.held & stretch.needs
-            claims.release(left)
+        self.keep(stretch.needs)
         wanted = sorted(stretch.needs - self.held)
         if not wanted:
             return True
@@ -439,6 +440,12 @@ class RobotAgent:
                 yield from self.rest(door.opening_time)
                 self.resume(errand)
         return not self.orders
+
+    def keep(self, needs: frozenset[str]) -> None:
+        """Let go of what is held, but for what is needed still."""
+        left, self.held = sorted(self.held - needs), self.held & needs
+        if left:
+            self.world.claims.release(left)
 
     def wait_for(self, granted: simpy.Event, stretch: Stretch, names: str) -> Step:
         """Wait for resources as long as patience lasts."""
@@ -482,24 +489,37 @@ class RobotAgent:
         if self.battery.level <= self.battery.capacity * 1e-12 and not any(o.kind == "fail" for o in self.orders):
             self.orders.insert(0, Order("fail", "the battery is empty"))
 
-    def move(self, stretch: Stretch, after: list[Stretch], errand: Errand) -> Step:
-        """Drive one stretch, and stop for what comes in the way; answer whether its end was reached."""
+    def move(self, group: list[Stretch], after: list[Stretch], errand: Errand) -> Step:
+        """Drive stretches in one go, and stop for what comes in the way; answer whether their end was reached."""
+        line = _joined(group)
         motion = drive(
-            stretch.points,
-            stretch.storeys,
+            line.points,
+            line.storeys,
             self.robot,
             speed=self.cruise,
             heading=self.heading,
-            limits=stretch.limits,
+            limits=_limits_of(group),
         )
+        gates = deque(gates_of(group, motion, self.robot.acceleration))
         begin, passed = float(self.world.clock.now), 0.0
         self.under_way = begin, motion
-        self.line = _joined([stretch, *after]) if self.world.is_eventful else None
+        self.line = _joined([*group, *after]) if gates or self.world.is_eventful else None
+        is_looking = True
         while True:
-            incident = self.world.next_incident(self, motion, begin, passed) if self.world.is_eventful else None
+            if is_looking:
+                incident = self.world.next_incident(self, motion, begin, passed) if self.world.is_eventful else None
             until = motion.duration if incident is None else incident.seconds
+            at_gate = bool(gates) and gates[0].seconds < until
+            until = gates[0].seconds if at_gate else until
             disturbed = yield from self.pause(self.world.pass_time(max(until - passed, 0.0)))
             passed = min(float(self.world.clock.now) - begin, motion.duration) if disturbed else until
+            is_looking = not at_gate or disturbed
+            if at_gate and not disturbed:
+                if self.go_through(gates.popleft()):
+                    continue
+                done = yield from self.brake(begin, motion, passed, errand, sudden=False)
+                self.keep(_held_at(group, self.driven))
+                return done
             if not disturbed and incident is None:
                 self.arrive(begin, motion, errand)
                 return True
@@ -513,6 +533,8 @@ class RobotAgent:
                     continue
             sudden = incident is not None and not disturbed and incident.kind in ("contact", "battery")
             done = yield from self.brake(begin, motion, passed, errand, sudden=sudden)
+            if len(group) > 1:
+                self.keep(_held_at(group, self.driven))
             if not disturbed and incident is not None:
                 if incident.kind == "battery":
                     self.settle()
@@ -521,9 +543,21 @@ class RobotAgent:
                     yield from self.make_way(incident.walker, errand)
             return done
 
+    def go_through(self, gate: Gate) -> bool:
+        """Claim what lies ahead if it is free, or let go of what lies behind; answer whether to go on."""
+        if gate.is_exit:
+            self.keep(gate.needs)
+            return True
+        wanted = sorted(gate.needs - self.held)
+        if not self.world.claims.take(wanted):
+            return False
+        self.held.update(wanted)
+        return True
+
     def arrive(self, begin: float, motion: Motion, errand: Errand) -> None:
         """Be where a motion ended."""
         self.under_way = None
+        self.driven = motion.length
         if self.world.keeps_history:
             self.recorder.add(begin, motion, self.status, errand.index)
         if motion.length > _PROGRESS:
@@ -778,6 +812,26 @@ def _heading(points: NDArray[np.float64]) -> float | None:
 
 def _joined(stretches: list[Stretch]) -> Line:
     """Put stretches together again."""
+    if len(stretches) == 1:
+        return Line(stretches[0].points, stretches[0].storeys)
     points = [stretches[0].points, *(stretch.points[1:] for stretch in stretches[1:])]
     storeys = [stretches[0].storeys, *(stretch.storeys[1:] for stretch in stretches[1:])]
     return Line(np.concatenate(points), np.concatenate(storeys))
+
+
+def _limits_of(group: list[Stretch]) -> tuple[float, ...] | None:
+    """Return the speed limit of every piece of some stretches; None if none has one."""
+    if all(stretch.limits is None for stretch in group):
+        return None
+    parts = [stretch.limits or (math.inf,) * (len(stretch.points) - 1) for stretch in group]
+    return tuple(limit for part in parts for limit in part)
+
+
+def _held_at(group: list[Stretch], driven: float) -> frozenset[str]:
+    """Return what is needed where a robot stands that has driven some metres into stretches."""
+    done = 0.0
+    for stretch in group:
+        done += stretch.length
+        if driven <= done + JOINED:
+            return stretch.needs
+    return group[-1].needs

@@ -106,13 +106,18 @@ def crossings(
     reached = np.append(0.0, steps.cumsum())
     lines = shapely.linestrings(np.stack([points[:-1, :2], points[1:, :2]], axis=1))
     found: list[list[tuple[float, float]]] = [[] for _ in areas]
+    on, low, high = set(storeys.tolist()), points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    bounds = shapely.bounds([polygon for polygon, _ in areas])
+    near_by = ((bounds[:, :2] <= high) & (bounds[:, 2:] >= low)).all(axis=1)  # never for an empty polygon
     for index, (polygon, storey) in enumerate(areas):
+        if storey not in on or not near_by[index]:
+            continue
         near = np.flatnonzero((storeys[:-1] == storey) & shapely.intersects(lines, polygon))
         for k in near.tolist():
             for begin, end in _inside(points[k, :2], points[k + 1, :2], shapely.intersection(lines[k], polygon)):
                 found[index].append((reached[k] + begin * steps[k], reached[k] + end * steps[k]))
     merged = [
-        Crossing(begin, end, index)
+        Crossing(float(begin), float(end), index)
         for index, parts in enumerate(found)
         for begin, end in _joined(parts)
         if end - begin > _TOUCH

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import simpy
@@ -38,13 +38,19 @@ class Claims:
     def request(self, names: Iterable[str]) -> simpy.Event | None:
         """Ask for resources; None if they are granted at once, else the event that they are."""
         wanted = tuple(sorted(names))
-        taken = {name for request in self.waiting for name in request.names}
-        if all(self.left[name] > 0 and name not in taken for name in wanted):
-            self._take(wanted)
+        if self.take(wanted):
             return None
         request = _Request(wanted, self.clock.event())
         self.waiting.append(request)
         return request.granted
+
+    def take(self, names: Sequence[str]) -> bool:
+        """Take resources if all are free and nobody waits for one; answer whether they are taken."""
+        waited_for = {name for request in self.waiting for name in request.names}
+        if any(self.left[name] <= 0 or name in waited_for for name in names):
+            return False
+        self._take(names)
+        return True
 
     def withdraw(self, granted: simpy.Event) -> None:
         """Give a request up; what it was granted meanwhile is given back."""

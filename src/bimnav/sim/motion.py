@@ -52,6 +52,41 @@ class Motion:
         """Return the row that holds some seconds after the begin."""
         return max(int(np.searchsorted(self.times, seconds, side="right")) - 1, 0)
 
+    @property
+    def reached(self) -> NDArray[np.float64]:
+        """(n,) float64, metres driven at the begin of every row."""
+        return np.append(0.0, np.linalg.norm(np.diff(self.points, axis=0), axis=1).cumsum())
+
+    def seconds_to(self, metres: float) -> float:
+        """Return when the robot has come some metres far, seconds since the begin."""
+        reached = self.reached
+        row = max(int(np.searchsorted(reached, metres, side="right")) - 1, 0)
+        if row >= len(reached) - 1:
+            return self.duration
+        share = (float(metres) - float(reached[row])) / float(reached[row + 1] - reached[row])
+        ease, span = float(self.eases[row]), float(self.times[row + 1] - self.times[row])
+        if ease != 1:  # share = u (ease + (1 - ease) u), solved for u
+            root = math.sqrt(max(ease * ease + 4 * (1 - ease) * share, 0.0))
+            share = 2 * share / (ease + root) if ease + root > 0 else 0.0
+        return float(self.times[row]) + share * span
+
+    def last_chance(self, metres: float, acceleration: float) -> float:
+        """Return the latest moment to begin to brake so as to stand within some metres, seconds since the begin.
+
+        What is driven and what braking takes grow together: twice as fast as the way while the robot gains
+        speed, like the way while it keeps it, and not at all while it brakes.
+        """
+        reached, spans = self.reached, np.diff(self.times)
+        for row in np.flatnonzero((spans > 0) & (np.diff(reached) > 0)).tolist():
+            mean = float(reached[row + 1] - reached[row]) / float(spans[row])
+            ease = float(self.eases[row])
+            first = ease * mean
+            room = metres - float(reached[row]) - first * first / (2 * acceleration)
+            way = room / 2 if ease < 1 else room
+            if ease <= 1 and float(reached[row]) + way < float(reached[row + 1]):
+                return self.seconds_to(max(float(reached[row]) + way, float(reached[row])))
+        return self.duration
+
     def point_at(self, seconds: float) -> NDArray[np.float64]:
         """Return where the robot is some seconds after the begin, (3,) metres."""
         return self._inside(seconds)[1]

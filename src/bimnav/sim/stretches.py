@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,17 +14,18 @@ from numpy.typing import NDArray
 from bimnav.sim.areas import Crossing, Passage, SpeedLimit, crossings, cut_at
 from bimnav.sim.doors import SimDoor
 from bimnav.sim.lifts import Lift
+from bimnav.sim.motion import Motion
 from bimnav.sim.routes import JOINED, Line
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Stretch", "cut"]
+__all__ = ["Gate", "Stretch", "cut", "gates_of"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
-    """A part of a way that is driven, or ridden, from rest to rest.
+    """A part of a way on which the same resources are needed, or that is ridden.
 
     Parameters
     ----------
@@ -51,6 +53,45 @@ class Stretch:
     limits: tuple[float, ...] | None = None
     area: BaseGeometry | None = None
     storey: int = 0
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """A moment in a motion at which resources are claimed, or left behind.
+
+    Parameters
+    ----------
+    seconds
+        Since the begin of the motion.
+    needs
+        What is to be held from then on.
+    is_exit
+        Whether everything else is let go.
+    """
+
+    seconds: float
+    needs: frozenset[str]
+    is_exit: bool
+
+
+def gates_of(group: Sequence[Stretch], motion: Motion, acceleration: float) -> list[Gate]:
+    """Return what a robot that drives stretches in one go claims and leaves, and when.
+
+    It claims as late as it can still stop in front, and leaves where a stretch ends.
+    """
+    gates, done = [], 0.0
+    for stretch, after in pairwise(group):
+        done += stretch.length
+        if after.needs - stretch.needs:
+            gates.append(Gate(motion.last_chance(done - JOINED / 2, acceleration), after.needs, is_exit=False))
+        if stretch.needs - after.needs:
+            gates.append(Gate(motion.seconds_to(done), after.needs, is_exit=True))
+    return sorted(gates, key=lambda gate: gate.seconds)
 
 
 def cut(

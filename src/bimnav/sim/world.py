@@ -257,6 +257,18 @@ class World:
         doors, given = tuple(self.doors.values()), self.setting
         return cut(line, doors, given.passages, given.lifts if agent.robot.uses_lifts else (), given.limits)
 
+    def passable(self, agent: RobotAgent, stretches: Sequence[Stretch]) -> int:
+        """Return how many stretches a robot drives in one go if what they need is free.
+
+        One that stops at once loses no time by it; a lift, and a door that takes time to open, stop everybody.
+        """
+        if math.isinf(agent.robot.acceleration):
+            return 1
+        for k, stretch in enumerate(stretches[1:], 1):
+            if stretch.lift is not None or any(door.state != "open" and door.opening_time for door in stretch.doors):
+                return k
+        return len(stretches)
+
     def decide(self, agent: RobotAgent, errand: Errand, obstacle: Closure) -> Decision:
         """Ask the policy what to do about a closed way."""
         policy = self.setting.policy
@@ -336,7 +348,10 @@ class World:
         for name, (seconds, kind) in self._looked(agent, motion).items():
             if name in self.hidden and passed <= seconds < motion.duration:
                 found.append(Incident(seconds, "contact" if kind == "contact" else "sense", self.hidden[name]))
+        on = set(motion.storeys.tolist()) if self.setting.walkers else ()
         for walker in self.setting.walkers:
+            if walker.person.storey not in on:
+                continue
             moment = self._stop_for(agent, motion, begin, passed, walker)
             if moment is not None:
                 found.append(Incident(moment, "person", walker=walker))
@@ -392,11 +407,11 @@ class World:
         seen = obstacle.polygon.buffer(self.setting.sensing.range)
         areas = [(body, obstacle.storey), (seen, obstacle.storey)]
         found = crossings(motion.points, motion.storeys, areas)
-        touch = min((_seconds(motion, c.begin) for c in found if c.area == 0), default=math.inf)
+        touch = min((motion.seconds_to(c.begin) for c in found if c.area == 0), default=math.inf)
         detected = math.inf
         for crossing in found:
             if crossing.area == 1 and self.setting.sensing.probability > 0 and detected == math.inf:
-                first, last = _seconds(motion, crossing.begin), _seconds(motion, crossing.end)
+                first, last = motion.seconds_to(crossing.begin), motion.seconds_to(crossing.end)
                 looks = int(self._rng_of(agent).geometric(self.setting.sensing.probability))
                 moment = first + (looks - 1) * self.setting.sensing.period
                 detected = moment if moment <= last else math.inf
@@ -633,20 +648,6 @@ def _closed(door: SimDoor) -> Closure:
 
 def _appended(lead: Line, line: Line) -> Line:
     return Line(np.concatenate([lead.points, line.points[1:]]), np.concatenate([lead.storeys, line.storeys[1:]]))
-
-
-def _seconds(motion: Motion, metres: float) -> float:
-    """Return when a motion has come some metres far, seconds since its begin."""
-    reached = np.append(0.0, np.linalg.norm(np.diff(motion.points, axis=0), axis=1).cumsum())
-    row = max(int(np.searchsorted(reached, metres, side="right")) - 1, 0)
-    if row >= len(reached) - 1:
-        return motion.duration
-    share = (metres - reached[row]) / (reached[row + 1] - reached[row])
-    ease, span = float(motion.eases[row]), float(motion.times[row + 1] - motion.times[row])
-    if ease != 1:  # share = u (ease + (1 - ease) u), solved for u
-        root = math.sqrt(max(ease * ease + 4 * (1 - ease) * share, 0.0))
-        share = 2 * share / (ease + root) if ease + root > 0 else 0.0
-    return float(motion.times[row]) + float(share) * span
 
 
 def _service_seconds(stop: Stop, robot: Robot, service_time: ServiceTime | float, rng: np.random.Generator) -> float:
