@@ -18,7 +18,10 @@ __all__ = ["ROBOTS", "card", "counted", "plan_svg"]
 ROBOTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f3c8d", "#5d6d1e")  # one after the other
 
 _SIDE = 200.0  # pixels of the longer side of a plan
-_STYLE = "border:1px solid #ddd8cf;border-radius:6px;padding:.5em .9em;display:inline-flex;gap:1.2em;max-width:52em"
+_STYLE = (
+    "border:1px solid #ddd8cf;border-radius:6px;padding:.5em .9em;display:inline-flex;flex-wrap:wrap;gap:1.2em;"
+    "max-width:min(52em,100%);box-sizing:border-box"
+)
 
 
 def card(title: str, rows: Iterable[tuple[str, Any]], picture: str = "") -> str:
@@ -39,8 +42,8 @@ def card(title: str, rows: Iterable[tuple[str, Any]], picture: str = "") -> str:
         for name, value in rows
         if value not in (None, "", ())
     )
-    table = f"<div><b>{html.escape(title)}</b><table style='border:0;margin:.3em 0 0'>{lines}</table></div>"
-    return f"<div style='{_STYLE}'>{table}{picture}</div>"
+    table = f"<b>{html.escape(title)}</b><table style='border:0;margin:.3em 0 0'>{lines}</table>"
+    return f"<div style='{_STYLE}'><div style='flex:1 1 16em'>{table}</div>{picture}</div>"
 
 
 def counted(values: Iterable[str], most: int = 6) -> str:
@@ -84,6 +87,8 @@ def plan_svg(areas: Iterable[tuple[BaseGeometry, str]], lines: Iterable[tuple[Ar
     for line, color in lines:
         parts.append(f'<polyline points="{points(line)}" fill="none" stroke="{color}" stroke-width="2"/>')
     width, height = (x1 - x0) * scale, (y1 - y0) * scale
+    style = "flex:none;max-width:100%"
     return (
-        f'<svg width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.1f} {height:.1f}">{"".join(parts)}</svg>'
+        f'<svg style="{style}" width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.1f} {height:.1f}">'
+        f"{''.join(parts)}</svg>"
     )

@@ -252,7 +252,7 @@ class Asset:
             for name, value, source in self.rows()
         )
         title = html.escape(f"{self.name or 'unnamed'} ({self.global_id}), {self.ifc_class}")
-        return f"<table><caption>{title}</caption>{cells}</table>"
+        return f"<div style='overflow-x:auto'><table><caption>{title}</caption>{cells}</table></div>"
 
 
 _TOLD = tuple(
