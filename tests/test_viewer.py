@@ -223,6 +223,14 @@ def test_real_models_open_with_hostile_names_as_text(opened, name, targets):
     )
 
 
+def test_a_roof_that_no_robot_reaches_does_not_hide_the_rooms(opened):
+    duplex = real_model("duplex/Duplex_A_20110907.ifc")
+    result = played(duplex, [("one", 2.0, -4.0, "Level 1"), ("skylight", 4.0, -9.0, "Roof")], cell_size=0.2)
+    page = opened(result)
+    visible = {level["name"]: level["visible"] for level in page.evaluate("window.bimnav.state().levels")}
+    assert visible == {"T/FDN": True, "Level 1": True, "Level 2": False, "Roof": False}
+
+
 def test_a_world_without_a_building_has_a_replay_too(opened):
     graph = NavGraph.from_mask(np.ones((10, 20), dtype=bool), cell_size=0.5)
     cell = Cell(0, 8, 17)

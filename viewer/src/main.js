@@ -95,9 +95,10 @@ class Replay {
     byId("fit").addEventListener("click", () => this.world.fit());
   }
 
-  /** Hide at first the storeys above all that robots and targets are on. */
+  /** Hide at first the storeys above all that robots, and targets they reach, are on. */
   showUsed() {
-    const used = [...this.scene.targets.map((target) => target.level), ...this.scene.robots.flatMap((robot) => [...robot.level])];
+    const reached = this.scene.targets.filter((target) => !target.reason);
+    const used = [...reached.map((target) => target.level), ...this.scene.robots.flatMap((robot) => [...robot.level])];
     const highest = Math.max(...used.map((level) => this.scene.levels[level].z), this.scene.levels[0].z);
     this.scene.levels.forEach((level, k) => {
       if (level.z <= highest + 1e-6) return;
