@@ -222,3 +222,11 @@ def test_targets_with_one_reason_share_a_line(capsys):
     told = [line for line in capsys.readouterr().out.splitlines() if "not served" in line]
     assert any(" and " in line and line.split(": ")[1].endswith(" more") for line in told)
     assert len({line.split(": ", 2)[2] for line in told}) == len(told)
+
+
+def test_many_conflicts_are_a_few_lines(capsys):
+    targets = [word for k in range(8) for word in ("--target", f"t{k}@1,16")]
+    assert main(["run", APARTMENT, *targets, "--cell", "0.5ft"]) == 0
+    told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  conflict ")]
+    assert len(told) == 6
+    assert told[-1].endswith("3 more targets on obstacle cells")

@@ -14,6 +14,7 @@ from bimnav.detections import read_targets
 if TYPE_CHECKING:
     from bimnav.cli._shared import Commands
 
+_LISTED = 5  # conflicts; the report lists them all
 _NAMED = 3  # of the targets that share a reason; the report lists them all
 _EXAMPLES = """\
 examples:
@@ -138,9 +139,11 @@ def _summary(report: dict[str, Any], *, is_point: bool) -> str:
         "  check    the path touches no obstacle"
         + ("" if clearance is None else f"; nearest is {clearance:.3f} m away")
     )
-    for conflict in report["conflicts"]:
+    for conflict in report["conflicts"][:_LISTED]:
         names = ", ".join(printable(o["name"]) for o in conflict["obstacles"])
         lines.append(f"  conflict {printable(conflict['name'])} shares cell {tuple(conflict['cell'])} with {names}")
+    if len(report["conflicts"]) > _LISTED:
+        lines.append(f"  conflict ... and {len(report['conflicts']) - _LISTED} more targets on obstacle cells")
     lines += [f"  not served: {names}: {reason}" for reason, names in _not_served(report).items()]
     grave = [issue for issue in report["issues"] if issue["severity"] != "info"]
     lines += [f"  {issue['severity']}: {issue['message']}" for issue in grave]
