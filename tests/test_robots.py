@@ -7,13 +7,16 @@ import math
 import os
 import subprocess
 import sys
+import tomllib
+from dataclasses import fields
+from importlib.resources import files
 
 import pytest
 from hypothesis import given, settings, strategies as st
 
 import bimnav as bn
 from bimnav.errors import FileMissingError, RobotError
-from bimnav.robots import VARIABLE, list_robots, load_robot, robot_named
+from bimnav.robots import VARIABLE, list_robots, load_robot, robot_named, robot_schema
 from tests.conftest import REPOSITORY
 
 
@@ -201,3 +204,35 @@ def test_run_takes_a_profile_and_explicit_sizes_go_before_it(write):
     wrong = run_cli("run", model, "--robot", f"{path}#maxi")
     assert (wrong.returncode, wrong.stderr.count("\n")) == (2, 1)
     assert "there is no robot 'maxi'" in wrong.stderr
+
+
+def test_the_schema_of_robot_files_takes_what_is_taken_and_refuses_what_is_refused(write):
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads(run_cli("robots", "schema").stdout)
+    assert schema == robot_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    judge = jsonschema.Draft202012Validator(schema)
+    judge.validate(tomllib.loads(files("bimnav.robots").joinpath("library.toml").read_text(encoding="utf-8")))
+    known = schema["$defs"]["Robot"]["properties"]
+    assert {"description", "extends"} | {f.name for f in fields(bn.Robot)} == {*known, "name"}
+    assert all(len(entry["description"]) > 10 for entry in known.values())
+    for line in (
+        "radius = -1",
+        "radius = 11",
+        "speed = 0",
+        'height = "tall"',
+        "uses_lifts = 1",
+        "keys = 'A'",
+        "outline = [[0, 0], [1]]",
+        "raech = 1",
+        "extends = 3",
+        "abilities = [' ']",
+    ):
+        text = f"[robots.a]\n{line}\n"
+        assert not judge.is_valid(tomllib.loads("schema = 1\n" + text)), line
+        with pytest.raises(RobotError):
+            load_robot(write(text))
+    for line in ("battery_wh = inf", "outline = [[1, 0], [0, 1], [-1, 0]]", "keys = ['A']", "turn_rate = 1"):
+        text = f"[robots.a]\n{line}\n"
+        judge.validate(tomllib.loads("schema = 1\n" + text))
+        load_robot(write(text))

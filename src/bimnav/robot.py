@@ -9,11 +9,11 @@ from typing import Any, TypeAlias
 
 from bimnav.errors import ValueRangeError
 
-__all__ = ["Robot"]
+__all__ = ["RANGES", "Robot"]
 
 Outline: TypeAlias = tuple[tuple[float, float], ...]
 
-_RANGES = {
+RANGES = {
     "radius": (0.0, 10.0),
     "height": (1e-3, 100.0),
     "speed": (1e-6, 100.0),
@@ -31,6 +31,7 @@ _RANGES = {
     "work_power": (0.0, 1e6),
     "charge_power": (0.0, 1e6),
 }
+"""The least and the greatest value of every number of a robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +116,7 @@ class Robot:
     def __post_init__(self) -> None:
         if not _is_text(self.name):
             self._refuse("name", self.name, "Give a text.")
-        for field, (low, high) in _RANGES.items():
+        for field, (low, high) in RANGES.items():
             value = getattr(self, field)
             if value is not None and not _is_within(value, low, high):
                 self._refuse(field, value, f"Give a number from {low:g} to {high:g}.")
@@ -165,7 +166,7 @@ class Robot:
         if not polygon.is_valid or polygon.area <= 0 or not polygon.covers(shapely.Point(0, 0)):
             self._refuse("outline", corners, hint)
         reach = max(math.hypot(*corner) for corner in outline)
-        if reach > _RANGES["radius"][1] or 0 < self.radius < reach:
+        if reach > RANGES["radius"][1] or 0 < self.radius < reach:
             self._refuse("radius", self.radius, f"The outline reaches {reach:g} m from the point the robot turns on.")
         object.__setattr__(self, "outline", outline if polygon.exterior.is_ccw else outline[::-1])
         object.__setattr__(self, "radius", max(self.radius, reach))

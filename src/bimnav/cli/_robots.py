@@ -27,11 +27,17 @@ def add_to(commands: Commands) -> None:
     """Add the command to the parser."""
     robots = commands.add_parser(
         "robots",
-        help="list the robots there are, or show one",
+        help="list the robots there are, show one, or print the schema of their files",
         epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    robots.add_argument("action", nargs="?", choices=("list", "show"), default="list")
+    robots.add_argument(
+        "action",
+        nargs="?",
+        choices=("list", "show", "schema"),
+        default="list",
+        help="schema: the JSON Schema of robot files, for editors",
+    )
     robots.add_argument("robot", nargs="?", metavar="NAME|FILE#NAME", help="with show: which one")
     robots.add_argument("--json", action="store_true", help="print JSON for machines")
     robots.set_defaults(command=_command)
@@ -39,8 +45,11 @@ def add_to(commands: Commands) -> None:
 
 def _command(options: argparse.Namespace) -> int:
     from bimnav.errors import RobotError
-    from bimnav.robots import list_robots, load_robot
+    from bimnav.robots import list_robots, load_robot, robot_schema
 
+    if options.action == "schema":
+        show_json(robot_schema())
+        return DONE
     if options.action == "show":
         if options.robot is None:
             raise RobotError("no robot is named.", "Name one, as in bimnav robots show inspection.")

@@ -15,9 +15,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 from bimnav.errors import FileKindError, FileMissingError, FileTooLargeError, InputError, RobotError, ValueRangeError
 from bimnav.robot import Robot
+from bimnav.robots._schema import robot_schema
 from bimnav.tasks._toml import Problem, Toml, read_toml
 
-__all__ = ["VARIABLE", "RobotInfo", "list_robots", "load_robot", "robot_named"]
+__all__ = ["VARIABLE", "RobotInfo", "list_robots", "load_robot", "robot_named", "robot_schema"]
 
 VARIABLE = "BIMNAV_ROBOTS"
 """The environment variable that holds users' own folders and files of robots."""
