@@ -49,6 +49,18 @@ def test_targets_come_from_options_and_files(capsys, tmp_path):
     assert {t["name"] for t in report["targets"] if t["source"] == "user"} == {"mud", "juice"}
 
 
+def test_how_paths_are_made_is_chosen_by_options(capsys):
+    arguments = ["run", APARTMENT, "--cell", "0.1", "--end", "1,17", "--smooth", "--clearance", "30cm"]
+    assert main([*arguments, "--objective", "time"]) == 0
+    told = capsys.readouterr().out
+    assert "along straight legs, proved fastest" in told
+    assert "end      (1.050, 17.050)" in told
+    assert main([*arguments, "--robot", "inspection", "--objective", "energy", "--json"]) == 0
+    tour = json.loads(capsys.readouterr().out)["tour"]
+    assert (tour["objective"], tour["is_smooth"], tour["end"][:2]) == ("energy", True, pytest.approx([1.05, 17.05]))
+    assert tour["cost"] > 100 * tour["length"]  # joules
+
+
 def test_coordinates_may_be_negative(capsys):
     house = str(real_model("houses/SampleHouse4.ifc"))
     arguments = ["run", house, "--cell", "0.1", "--start", "-3,2", "--target", "spill@-1.5,1", "--json"]
@@ -90,6 +102,11 @@ def test_some_targets_unreached_is_exit_code_three(capsys):
         (["run", APARTMENT, "--start", "99,99"], "no floor"),
         (["run", APARTMENT, "--start", "2.8,17.9"], "Round Table"),
         (["run", APARTMENT, "--start", "1,14,Attic"], "Ground Floor"),
+        (["run", APARTMENT, "--end", "99,99"], "end (99, 99) lies on no floor"),
+        (["run", APARTMENT, "--end", "1,17", "--return"], "both end elsewhere and return"),
+        (["run", APARTMENT, "--objective", "money"], "choose from"),
+        (["run", APARTMENT, "--objective", "energy"], "draws no power"),
+        (["run", APARTMENT, "--clearance", "-1"], "clearance is -1"),
         (["run", APARTMENT, "--target", "spill@99,99"], "spill"),
         (["run", APARTMENT, "--target", "spill"], "NAME@X,Y"),
         (["run", APARTMENT, "--targets", "none.csv"], "none.csv"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise, permutations
 
 import numpy as np
@@ -12,7 +13,15 @@ import pytest
 import shapely
 
 import bimnav as bn
-from bimnav.errors import NoTargetError, OutsideMapError, StartBlockedError, TaskError
+from bimnav.errors import (
+    GoalBlockedError,
+    InputError,
+    NoTargetError,
+    OutsideMapError,
+    StartBlockedError,
+    TaskError,
+    ValueRangeError,
+)
 from bimnav.testing import box, room, two_rooms
 from tests.conftest import real_model
 
@@ -183,3 +192,50 @@ def test_a_job_does_not_begin_in_a_pocket_between_things():
     start = bn.find_start(graph)
     assert not (1.5 < start.point[0] < 3.5 and 1.0 < start.point[1] < 3.0)
     assert start.source == "near the middle of space"
+
+
+def test_a_mission_ends_where_it_is_told_along_straight_legs_that_keep_away(flat):
+    plain = bn.run(flat, cell_size=FOOT / 2)
+    x, y, _ = plain.start.point
+    mission = bn.run(flat, cell_size=FOOT / 2, end=(x, y), smooth="any_angle", clearance=0.3, objective="time")
+    assert mission.is_complete
+    assert mission.check.ok
+    assert mission.tour.end == mission.graph.frame.cell_at(x, y)
+    assert mission.result.state_at(mission.result.makespan).x == pytest.approx(mission.tour.end_point[0])
+    assert all(leg.legs is not None for leg in mission.tour.legs)
+    assert mission.graph.clearances == ((0.3, 4.0),)
+    assert mission.graph.objective == "time"
+    assert mission.check.clearance > plain.check.clearance
+    told = mission.report()["tour"]
+    assert (told["objective"], told["is_smooth"], told["end"]) == ("time", True, list(mission.tour.end_point))
+    assert plain.report()["tour"]["end"] is None
+
+
+def test_an_end_that_cannot_be_reached_or_is_no_place_is_refused(flat):
+    with pytest.raises(GoalBlockedError, match=r"end \(2\.8, 17\.9\) is blocked: its cell touches Round Table"):
+        bn.run(flat, end=(2.8, 17.9))
+    with pytest.raises(OutsideMapError, match=r"end \(99, 99\) lies on no floor"):
+        bn.run(flat, end=(99, 99))
+    with pytest.raises(InputError, match="both end elsewhere and return"):
+        bn.run(flat, end=(1, 17), return_to_start=True)
+    with pytest.raises(ValueRangeError, match="draws no power"):
+        bn.run(flat, objective="energy")
+
+
+def test_a_visit_to_a_charger_is_told_apart_from_the_targets():
+    dock = box("dock", 0.2, 0.2, 0.0, 0.5, 0.5, 0.3, name="Charging dock")
+    building = room(20.0, 2.0, elements=[dock]).with_targets([("near", 12.0, 1.5), ("far", 1.0, 1.5)])
+    task = bn.Task("t", docks=[bn.Rule("IfcBuildingElementProxy")])
+    tired = bn.Robot("R1", speed=1.0, drive_power=3600.0, battery_wh=20 / 0.9, charge_power=3600.0)
+    mission = bn.run(building, task=task, robot=tired, start=(6.0, 1.0), end=(19.0, 1.0))
+    report = mission.report()
+    assert {*report["tour"]["order"]} == {target["global_id"] for target in report["targets"]}
+    assert [charge["name"] for charge in report["tour"]["charges"]] == ["Charging dock"]
+
+
+def test_the_judge_knows_where_a_tour_is_to_end(flat):
+    mission = bn.run(flat, cell_size=FOOT / 2, end=(1.0, 17.0))
+    assert mission.check.ok
+    assert "missing-leg" in {v.kind for v in bn.check_plan(replace(mission.tour, end=None)).violations}
+    cut = replace(mission.tour, legs=mission.tour.legs[:-1])
+    assert {v.kind for v in bn.check_plan(cut).violations} == {"missing-leg"}

@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -70,12 +70,17 @@ def report_of(mission: Mission) -> dict[str, Any]:
             for conflict in graph.conflicts
         ],
         "tour": {
-            "order": [stop.global_id for stop in tour.stops],
+            "order": [stop.global_id for stop in tour.stops if stop.kind == "target"],
             "length": tour.length,
+            "objective": graph.objective,
+            "cost": tour.cost,
             "duration": result.distance / environment.robot.speed,
             "is_optimal": tour.is_optimal,
             "lower_bound": tour.lower_bound,
             "returns": tour.return_to_start,
+            "end": None if tour.end is None else list(tour.end_point),
+            "is_smooth": any(leg.legs is not None for leg in tour.legs),
+            "charges": [asdict(charge) for charge in tour.charges],
         },
         "check": {
             "ok": mission.check.ok,

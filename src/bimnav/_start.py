@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import shapely
 
 from bimnav.building import Element, Space
 from bimnav.environment import IndoorEnvironment, Place, Region
-from bimnav.errors import NothingWalkableError, OutsideMapError, StartBlockedError
+from bimnav.errors import GoalBlockedError, NothingWalkableError, OutsideMapError, StartBlockedError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 
-__all__ = ["Start", "find_start"]
+__all__ = ["Start", "find_end", "find_start"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ def find_start(graph: NavGraph, place: Place | None = None) -> Start:
             "Use smaller cells or a smaller robot.",
         )
     if place is not None:
-        return _start_at(graph, place)
+        return _place_at(graph, place, "start")
     for dock, _ in _docks(environment):
         bounds = dock.bounds
         if bounds is None:
@@ -73,6 +74,17 @@ def find_start(graph: NavGraph, place: Place | None = None) -> Start:
     rows, cols = np.nonzero(parts == roomiest)
     anywhere = Cell(storey, int(rows[0]), int(cols[0]))
     return next(inside, Start(anywhere, graph.frame.center_of(anywhere), f"on {environment.storeys[storey].name}"))
+
+
+def find_end(graph: NavGraph, place: Place) -> Cell:
+    """Return the cell of a place at which a job ends.
+
+    Raises
+    ------
+    OutsideMapError, GoalBlockedError
+        As for a start.
+    """
+    return _place_at(graph, place, "end").cell
 
 
 def _middle_of(graph: NavGraph, region: Region, part: int) -> Start | None:
@@ -118,7 +130,7 @@ def _nearest_free(
     return cell, frame.center_of(cell)
 
 
-def _start_at(graph: NavGraph, place: Place) -> Start:
+def _place_at(graph: NavGraph, place: Place, role: Literal["start", "end"]) -> Start:
     environment = _environment_of(graph)
     storey = environment.storeys_at(place)[0]
     x, y = float(place[0]), float(place[1])
@@ -126,7 +138,7 @@ def _start_at(graph: NavGraph, place: Place) -> Start:
     point = shapely.Point(x, y)
     on_floor = environment.floor(storey).intersects(point)
     blocked = any(body.intersects(point) for _, body in environment.bodies_on(storey))
-    where = f"start ({x:g}, {y:g})" + (f" on {named}" if named is not None else "")
+    where = f"{role} ({x:g}, {y:g})" + (f" on {named}" if named is not None else "")
     if not on_floor and not blocked:
         x_min, y_min, x_max, y_max = graph.frame.bounds
         raise OutsideMapError(
@@ -143,7 +155,8 @@ def _start_at(graph: NavGraph, place: Place) -> Start:
     touched = [o for o, body in environment.bodies_on(storey) if body.intersects(box)]
     names = ", ".join(f"{o.name or o.ifc_class} ({o.global_id})" for o in touched) or "the edge of the floor"
     hint = f"The nearest free point is ({near[1][0]:.3f}, {near[1][1]:.3f})." if near else "Use smaller cells."
-    raise StartBlockedError(
+    error = StartBlockedError if role == "start" else GoalBlockedError
+    raise error(
         f"{where} is blocked: its cell touches {names}.",
         hint,
         {"x": x, "y": y, "obstacles": [o.global_id for o in touched]},

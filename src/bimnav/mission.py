@@ -11,7 +11,7 @@ import shapely
 
 from bimnav._lost import Lost, refuse_lost, with_boxes
 from bimnav._report import report_of, write_mission
-from bimnav._start import Start, find_start
+from bimnav._start import Start, find_end, find_start
 from bimnav.building import Building, Detection
 from bimnav.environment import IndoorEnvironment, Place, make_environment
 from bimnav.errors import (
@@ -19,12 +19,13 @@ from bimnav.errors import (
     OutputError,
     OutsideMapError,
 )
-from bimnav.graph import NavGraph, build_graph
+from bimnav.graph import NavGraph, Objective, build_graph
 from bimnav.robot import Robot
 
 if TYPE_CHECKING:
     from bimnav._progress import Progress
     from bimnav.plan import Tour
+    from bimnav.plan.paths import Smooth
     from bimnav.sim import SimResult
     from bimnav.tasks import Task
     from bimnav.verify import Check
@@ -68,6 +69,10 @@ def run(
     refine: Literal["auto"] | None = None,
     on_conflict: Literal["approach", "reach"] = "approach",
     return_to_start: bool = False,
+    end: Place | None = None,
+    objective: Objective | None = None,
+    clearance: float = 0.0,
+    smooth: Smooth | None = None,
     outdoors: bool = False,
     lost: Lost | Mapping[str, Lost] = "abort",
     seed: int = 0,
@@ -97,6 +102,16 @@ def run(
         As for `build_graph`.
     return_to_start
         Whether the robot goes back in the end.
+    end
+        `(x, y)` or `(x, y, storey)` in metres: where the robot goes behind its last stop, to the middle of
+        that cell; None for nowhere.
+    objective
+        What paths make least, `distance`, `time` or `energy`; None for what the task says.
+    clearance
+        Distance from obstacles that paths prefer, metres, beyond the robot's radius; see
+        `NavGraph.with_clearance`.
+    smooth
+        `any_angle` draws the legs straight; None leaves them on the cells.
     outdoors
         Whether floor outside the walls counts, too.
     lost
@@ -145,13 +160,17 @@ def run(
         connectivity=connectivity,
         refine=refine,
         on_conflict=on_conflict,
-        objective=loaded.objective,
+        objective=loaded.objective if objective is None else objective,
+        clearance=clearance,
     )
     _refuse_targets_outside(graph, environment)
     begin = find_start(graph, start)
-    tour = plan_tour(graph, begin.cell, start_point=begin.point, return_to_start=return_to_start)
+    last = None if end is None else find_end(graph, end)
+    tour = plan_tour(
+        graph, begin.cell, start_point=begin.point, return_to_start=return_to_start, end=last, smooth=smooth
+    )
     refuse_lost(tour, lost)
-    tour, check = _checked(tour)
+    tour, check = _checked(tour, smooth)
     result = simulate(tour, rng=rng)
     mission = Mission(building, loaded, environment, tour.graph, begin, tour, check, result)
     return mission if out is None else write_mission(mission, Path(out))
@@ -172,7 +191,7 @@ def _refuse_targets_outside(graph: NavGraph, environment: IndoorEnvironment) -> 
             )
 
 
-def _checked(tour: Tour) -> tuple[Tour, Check]:
+def _checked(tour: Tour, smooth: Smooth | None) -> tuple[Tour, Check]:
     """Judge a tour; where the paper's rule led into an obstacle, stand next to it instead."""
     from bimnav.plan import plan_tour
     from bimnav.verify import check_plan
@@ -185,6 +204,8 @@ def _checked(tour: Tour) -> tuple[Tour, Check]:
             tour.start,
             start_point=tour.start_point,
             return_to_start=tour.return_to_start,
+            end=tour.end,
+            smooth=smooth,
         )
         check = check_plan(tour)
     check.raise_if_unsafe()

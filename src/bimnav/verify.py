@@ -359,7 +359,10 @@ def _refusal(
 def _tears(tour: Tour, route: Sequence[NDArray[np.float64]]) -> Iterator[Violation]:
     """Find where a route does not begin, go on or end where the tour says."""
     ends = [stop.end for stop in tour.stops]
-    if tour.return_to_start and (ends or route):
+    last = getattr(tour, "end", None)
+    if last is not None:
+        ends.append(tour.graph.frame.center_of(last))
+    elif tour.return_to_start and (ends or route):
         ends.append(tour.start_point)
     if len(route) != len(ends):
         yield _refusal("missing-leg", f"the route has {len(route)} legs where its stops need {len(ends)}")

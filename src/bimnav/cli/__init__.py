@@ -17,6 +17,8 @@ __all__ = ["main"]
 
 _SIGNED = (
     "--start",
+    "--end",
+    "--clearance",
     "--target",
     "--cell",
     "--radius",

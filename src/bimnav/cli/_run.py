@@ -21,6 +21,7 @@ examples:
   bimnav run apartment.ifc --task cleaning --cell 0.5ft --out out
   bimnav run house.ifc --target "spill@2.5,1" --target "peel@4,2,Level 2" --cell 0.1 --json
   bimnav run house.ifc --targets detections.csv --robot R2 --radius 0.25 --start -1,1
+  bimnav run house.ifc --robot inspection --objective time --smooth --clearance 30cm --end 2,3
 
 lengths are metres; write 1ft, 30cm, 12in or 5mm for other units. exit code 0: done, 2: bad input,
 3: some targets are not served (the rest of the job is done).
@@ -69,6 +70,18 @@ def add_to(commands: Commands) -> None:
     )
     run.add_argument("--outdoors", action="store_true", help="floor outside the walls counts, too")
     run.add_argument("--return", dest="return_to_start", action="store_true", help="go back to the start in the end")
+    run.add_argument("--end", type=place, metavar="X,Y[,STOREY]", help="where to go behind the last stop")
+    run.add_argument(
+        "--objective",
+        choices=("distance", "time", "energy"),
+        help="what paths make least (default: what the task says)",
+    )
+    run.add_argument(
+        "--clearance", type=length, default=0.0, metavar="SIZE", help="distance from obstacles that paths prefer"
+    )
+    run.add_argument(
+        "--smooth", action="store_const", const="any_angle", help="draw the way straight, at any angle, past obstacles"
+    )
     run.add_argument("--seed", type=int, default=0, help="for what is random (default: 0)")
     run.add_argument("--out", metavar="DIR", help="write figures, tables and the report here")
     run.add_argument("--json", action="store_true", help="print the whole report as JSON")
@@ -90,6 +103,10 @@ def _command(options: argparse.Namespace) -> int:
         refine=options.refine,
         on_conflict=options.on_conflict,
         return_to_start=options.return_to_start,
+        end=options.end,
+        objective=options.objective,
+        clearance=options.clearance,
+        smooth=options.smooth,
         lost=options.lost,
         outdoors=options.outdoors,
         seed=options.seed,
@@ -131,8 +148,18 @@ def _summary(report: dict[str, Any], *, is_point: bool) -> str:
         aside = f", from {target['distance']:.2f} m away" if target["approach"] == "standing" else ""
         x, y, _ = target["destination"]
         lines.append(f"           {printable(target['name'])} at ({x:.3f}, {y:.3f}){aside}")
-    proved = "proved shortest" if tour["is_optimal"] else f"at least {tour['lower_bound']:.2f} m is needed"
-    lines.append(f"  tour     {tour['length']:.2f} m along the cells, {proved}")
+    best, unit = {"distance": ("shortest", "m"), "time": ("fastest", "s"), "energy": ("thriftiest", "J")}[
+        tour["objective"]
+    ]
+    proved = f"proved {best}" if tour["is_optimal"] else f"at least {tour['lower_bound']:.2f} {unit} is needed"
+    along = "straight legs" if tour["is_smooth"] else "the cells"
+    lines.append(f"  tour     {tour['length']:.2f} m along {along}, {proved}")
+    if tour["end"]:
+        lines.append(f"  end      ({tour['end'][0]:.3f}, {tour['end'][1]:.3f})")
+    lines += [
+        f"  charges  {c['energy_wh']:.1f} Wh at {printable(c['name'])}, {c['detour']:.2f} m aside"
+        for c in tour["charges"]
+    ]
     lines.append(f"  time     {report['simulation']['makespan']:.1f} s, {tour['duration']:.1f} s of it on the move")
     clearance = report["check"]["clearance"]
     lines.append(
