@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 
 import bimnav as bn
 from bimnav import Cell, NavGraph, Robot, Stop, plan_tour, plan_tours
+from bimnav.errors import ValueRangeError
 from bimnav.links import Link
 from bimnav.testing import box, room
 
@@ -169,3 +170,21 @@ def test_ways_between_cells_are_measured_alike_with_and_without_a_look_at_every_
     for a, b in itertools.combinations(range(len(cells)), 2):
         if math.isfinite(cost[a, b]):
             assert plain.seconds[a, b] == pytest.approx(bn.find_path(graph, cells[a], cells[b]).length / 0.4)
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+def test_a_path_makes_least_what_it_is_asked_to(objective):
+    environment = bn.make_environment(room(10.0, 2.0), bn.Task("task"), WALKER)
+    link = Link(Cell(0, 0, 5), Cell(1, 0, 5), 3.0, seconds=40.0, kind="lift")
+    stair = Link(Cell(0, 0, 0), Cell(1, 0, 0), 12.0, kind="stair")
+    mask = NavGraph.from_mask(np.ones((2, 1, 6), dtype=bool))
+    ways = {"connectors": (link, stair), "environment": environment}
+    graph = NavGraph(mask.frame, mask.cost, mask.obstacle, mask.floor, 8, **ways)
+    ends = Cell(0, 0, 5), Cell(1, 0, 5)
+    found = bn.find_path(graph, *ends, objective=objective)
+    built = bn.find_path(graph.with_objective(objective), *ends)
+    assert (found.cost, found.cells) == (built.cost, built.cells)
+    assert [ride.kind for _, ride in found.rides] == ["stair" if objective == "time" else "lift"]
+    assert found.graph is bn.find_path(graph, *ends, objective=objective).graph
+    with pytest.raises(ValueRangeError, match="objective is 'money'"):
+        bn.find_path(graph, *ends, objective="money")

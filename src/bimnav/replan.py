@@ -52,9 +52,12 @@ class Replan:
 class Replanner:
     """Keeps the path of one robot a cheapest one while its world changes.
 
-    A change that leaves the way ahead as it is, and makes nothing cheaper, needs no search. Else the path is
-    searched anew, and kept if it is still a cheapest one; the topology of the building names the doors and
-    connectors that the new way takes in place of others.
+    A change that leaves the way ahead as it is, and makes nothing cheaper, needs no search: a door that closes
+    elsewhere, or one the way does not pass. Else the path is searched anew over the cells, and kept if it is still
+    a cheapest one. A closed door is blocked cells to that search, which is exact, so the path costs what it
+    costs in a graph built anew. The topology of spaces and doors would only say which rooms to pass: it measures
+    from middle to middle, and the rooms of its shortest way need not be those of the shortest path. So it is asked
+    for names: of the doors and connectors that the new way takes in place of others.
 
     Parameters
     ----------

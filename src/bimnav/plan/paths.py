@@ -24,7 +24,7 @@ from bimnav.errors import (
     StartBlockedError,
     ValueRangeError,
 )
-from bimnav.graph import NavGraph
+from bimnav.graph import NavGraph, Objective
 from bimnav.grid import Cell
 from bimnav.smooth import straighten, turns_of
 
@@ -53,6 +53,7 @@ Smooth = Literal["any_angle"]
 _PROVED = 1e-9  # relative; a smaller gap is rounding
 
 _layouts: WeakKeyDictionary[NavGraph, search.Layout] = WeakKeyDictionary()
+_variants: WeakKeyDictionary[NavGraph, dict[Objective, NavGraph]] = WeakKeyDictionary()
 _written: WeakKeyDictionary[NavGraph, rustworkx.PyGraph[int, float]] = WeakKeyDictionary()
 
 
@@ -130,6 +131,7 @@ def find_path(
     algorithm: Algorithm = "auto",
     engine: Engine = "compiled",
     smooth: Smooth | None = None,
+    objective: Objective | None = None,
 ) -> Path:
     """Find a cheapest path.
 
@@ -149,6 +151,9 @@ def find_path(
         slower: a second opinion. Which of several cheapest paths they return may differ.
     smooth
         `any_angle` draws the path straight, see `smooth_path`.
+    objective
+        `distance`, `time` or `energy`: what to make least instead of what the graph says, as on
+        `graph.with_objective(objective)`.
 
     Returns
     -------
@@ -169,6 +174,7 @@ def find_path(
     if engine not in ("compiled", "rustworkx"):
         raise ValueRangeError(f"engine is {engine!r}.", "Give 'compiled' or 'rustworkx'.")
     check_smooth(smooth)
+    graph = graph if objective is None else _with_objective(graph, objective)
     begin = free_index(graph, start, "start")
     end = free_index(graph, goal, "goal")
     if engine == "rustworkx":
@@ -181,6 +187,16 @@ def find_path(
         length = _length(graph, found.indices) if graph.connectors else found.length * d
         path = Path(graph, found.indices, length, found.cost * d * graph.unit_cost)
     return smooth_path(path) if smooth else path
+
+
+def _with_objective(graph: NavGraph, objective: Objective) -> NavGraph:
+    """Return the graph with another objective, the same one every time, so that what is known of it is kept."""
+    if objective == graph.objective:
+        return graph
+    known = _variants.setdefault(graph, {})
+    if objective not in known:
+        known[objective] = graph.with_objective(objective)
+    return known[objective]
 
 
 def check_smooth(smooth: Smooth | None) -> None:
