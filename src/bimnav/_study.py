@@ -24,7 +24,7 @@ from bimnav.errors import BimnavError, InputError, MissingExtraError, ValueRange
 from bimnav.graph import NavGraph, build_graph
 from bimnav.grid import Cell
 from bimnav.robot import Robot
-from bimnav.sim.log import csv_text
+from bimnav.sim.log import csv_text, dataframe_of
 from bimnav.stops import Stop, Unreached
 
 if TYPE_CHECKING:
@@ -153,11 +153,7 @@ class Study:
         MissingExtraError
             If pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError as error:
-            raise MissingExtraError("to_dataframe needs pandas.", "pip install 'bimnav[dataframe]'") from error
-        return pandas.DataFrame.from_records(list(self.rows), columns=list(self.columns))
+        return dataframe_of(list(self.rows), columns=list(self.columns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

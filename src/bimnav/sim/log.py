@@ -172,11 +172,22 @@ class EventLog:
         MissingExtraError
             If pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError as error:
-            raise MissingExtraError("to_dataframe needs pandas.", "pip install 'bimnav[dataframe]'") from error
-        return pandas.DataFrame.from_records(self.to_records(), columns=list(self.columns))
+        return dataframe_of(self.to_records(), columns=list(self.columns))
+
+
+def dataframe_of(rows: Any, columns: list[str] | None = None) -> pandas.DataFrame:
+    """Return records, or an array of them, as a pandas data frame.
+
+    Raises
+    ------
+    MissingExtraError
+        If pandas is not installed.
+    """
+    try:
+        import pandas
+    except ImportError as error:
+        raise MissingExtraError("to_dataframe needs pandas.", "pip install 'bimnav[dataframe]'") from error
+    return pandas.DataFrame.from_records(rows, columns=columns)
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[float | str | None]]) -> str:

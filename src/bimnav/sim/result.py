@@ -20,7 +20,7 @@ from bimnav.sim.clearance import (
     clearance_to_walls,
     encounters,
 )
-from bimnav.sim.log import EventLog
+from bimnav.sim.log import EventLog, dataframe_of
 from bimnav.sim.people import Person, Walker
 from bimnav.sim.track import RobotState, RobotStatus, Track
 
@@ -404,11 +404,7 @@ class SimResult:
         MissingExtraError
             If pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError as error:
-            raise MissingExtraError("to_dataframe needs pandas.", "pip install 'bimnav[dataframe]'") from error
-        return pandas.DataFrame(self.trajectories(step))
+        return dataframe_of(self.trajectories(step))
 
     def route_rows(self, robot: str | None = None) -> list[tuple[float, float, str, float]]:
         """Return `(x, y, storey, time)` wherever the motion of a robot changes, in execution order: m, name, s."""
