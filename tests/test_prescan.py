@@ -26,7 +26,7 @@ from bimnav.errors import (
     IfcUnitsError,
     InputError,
 )
-from bimnav.ifc import _prescan, _text
+from bimnav.ifc import _prescan, _survey, _text
 from bimnav.ifc._prescan import prescan, scan
 from tests.conftest import REAL_IFC, real_model
 from tests.ifc_text import FRAME, box, model, product
@@ -472,3 +472,86 @@ def test_ten_megabytes_take_less_than_a_second():
     start = time.process_time()
     scan(text, "house.ifc")
     assert len(text) / (time.process_time() - start) > 10e6
+
+
+# The compiled look must say what the plain one says; it may only leave things to it.
+
+
+def _outcome(text: bytes) -> object:
+    try:
+        found = scan(text, "m.ifc")
+    except BimnavError as error:
+        return type(error), str(error), error.context
+    return found, list(found.shaped.items())
+
+
+def _damaged(text: bytes, rng: random.Random) -> bytes:
+    for _ in range(rng.choice((1, 1, 2, 5))):
+        numbers = list(re.finditer(rb"#\d+", text))
+        at = rng.randrange(max(text.find(b"DATA;"), 0), len(text))
+        number, other = rng.choice(numbers), rng.choice(numbers)[0]
+        lines = text.splitlines(keepends=True)
+        line, place = rng.randrange(len(lines)), rng.randrange(len(lines))
+        kind = rng.randrange(7)
+        if kind == 0:
+            text = text[:at] + text[at + 1 :]
+        elif kind == 1:
+            text = text[:at] + bytes([rng.choice(b"'#();=/*,!$ \n\t\0\x85aB07")]) + text[at:]
+        elif kind == 2:
+            text = text[: number.start()] + other + text[number.end() :]
+        elif kind == 3:
+            text = (
+                text[: number.start()]
+                + b"#%d" % rng.choice((0, 7, 10**6, 10**17, 10**18, 10**19, 2**64))
+                + text[number.end() :]
+            )
+        elif kind == 4:
+            text = b"".join(lines[:line] + lines[line + 1 :])
+        elif kind == 5:
+            text = b"".join([*lines[:place], lines[line], *lines[place:]])
+        else:
+            piece = rng.choice((b"''", b"'a;'", b"/* #1 */", b" ( ", b"''''", b"#1", b"ENDSEC;", b"IFCWALL(", b"'#1'"))
+            text = text[:at] + piece + text[at:]
+    return text
+
+
+def _in_both_ways(text: bytes, monkeypatch: pytest.MonkeyPatch) -> tuple[object, object]:
+    swift = _outcome(text)
+    with monkeypatch.context() as patch:
+        patch.setattr(_prescan, "_compiled", lambda: None)
+        return swift, _outcome(text)
+
+
+def test_the_compiled_look_and_the_plain_one_agree_on_damaged_models(monkeypatch):
+    parts = (
+        box(200, "it''s, #12; (a) chair", "IFCFURNITURE"),
+        "#300=IFCRELAGGREGATES('0000000000000000000300',$,$,$,#100,(#200));",
+        "#301=IFCLOCALPLACEMENT(#101,#5);",
+        "#302=IFCRELCONTAINEDINSPATIALSTRUCTURE('0000000000000000000302',$,$,$,(#100,#200),#7);",
+    )
+    sound = model(*parts).encode()
+    assert _survey.survey(sound, sound.index(b"DATA;") + 5) is not None
+    rng = random.Random(7)
+    for _ in range(600):
+        text = _damaged(sound, rng)
+        swift, plain = _in_both_ways(text, monkeypatch)
+        assert swift == plain, text
+
+
+@pytest.mark.parametrize("name", ["duplex/Duplex_A_20110907.ifc", "nasty/House.ifc", "houses/SampleHouse4.ifc"])
+def test_the_compiled_look_and_the_plain_one_agree_on_real_models(name, monkeypatch):
+    text = _text.load(real_model(name))
+    assert _survey.survey(text, text.index(b"DATA;") + 5) is not None
+    swift, plain = _in_both_ways(text, monkeypatch)
+    assert swift == plain
+
+
+@pytest.mark.parametrize("length", [499, 500, 501, 502])
+@pytest.mark.parametrize("is_backward", [True, False])
+def test_the_compiled_look_and_the_plain_one_agree_on_how_deep_is_too_deep(length, is_backward, monkeypatch):
+    numbers = range(1000, 1000 + length)
+    chain = [f"#{n}=IFCLOCALPLACEMENT(#{n + 1},$);" for n in numbers] + [f"#{1000 + length}=IFCLOCALPLACEMENT($,$);"]
+    text = model(*(reversed(chain) if is_backward else chain)).encode()
+    swift, plain = _in_both_ways(text, monkeypatch)
+    assert swift == plain
+    assert isinstance(plain[0], type) is (length > 500)

@@ -41,6 +41,7 @@ __all__ = [
     "Storey",
 ]
 
+_TOGETHER = 100_000  # vertices of copies that are worked on at once
 _FARTHEST = 1e8  # metres from the origin; beyond it float64 no longer holds a tenth of a micrometre
 
 
@@ -111,6 +112,28 @@ class Shape:
         bounds = np.array([points.min(axis=0), points.max(axis=0)]) if len(points) else np.full((2, 3), np.nan)
         bounds.flags.writeable = False
         object.__setattr__(self, "bounds", bounds)
+
+    @classmethod
+    def copies(cls, mesh: Mesh, placements: NDArray[np.float64]) -> list[Self]:
+        """Put a mesh in many places, (n, 4, 4): the same as one shape after the other, many times faster."""
+        placements = np.array(placements, dtype=np.float64)
+        if placements.shape[1:] != (4, 4) or not np.isfinite(placements).all():
+            raise GeometryError("a placement is not a finite (4, 4) matrix.")
+        bounds = np.full((len(placements), 2, 3), np.nan)
+        together = max(1, _TOGETHER // max(1, len(mesh.vertices)))
+        for k in range(0, len(placements) if len(mesh.vertices) else 0, together):
+            some = placements[k : k + together]
+            points = mesh.vertices @ some[:, :3, :3].transpose(0, 2, 1) + some[:, None, :3, 3]
+            bounds[k : k + together, 0], bounds[k : k + together, 1] = points.min(axis=1), points.max(axis=1)
+        placements.flags.writeable = bounds.flags.writeable = False
+        shapes = []
+        for placement, box in zip(placements, bounds, strict=True):
+            shape = object.__new__(cls)
+            object.__setattr__(shape, "mesh", mesh)
+            object.__setattr__(shape, "placement", placement)
+            object.__setattr__(shape, "bounds", box)
+            shapes.append(shape)
+        return shapes
 
     def __reduce__(self) -> tuple[type[Self], tuple[Mesh, NDArray[np.float64]]]:
         return type(self), (self.mesh, self.placement)

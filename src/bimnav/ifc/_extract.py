@@ -15,7 +15,7 @@ from bimnav.ifc._extent import extent_of
 from bimnav.ifc._findings import Findings
 from bimnav.ifc._geometry import Geometry, read_geometry
 from bimnav.ifc._georeference import anchor_rows, georeference_row
-from bimnav.ifc._kernel import Entity, File
+from bimnav.ifc._kernel import Entity, File, attribute, is_kind
 from bimnav.ifc._model import Model, to_building
 from bimnav.ifc._products import BodyFinder, identify, is_terrain, left_out_by_class, sanitize, sorted_of
 from bimnav.ifc._relations import Relations, open_circles
@@ -84,7 +84,7 @@ def extract(
 
     findings.about_description(sorted_of(file, "IfcProject", "IfcSite", "IfcBuilding"))
 
-    asked = [product for product in products if product.Representation]
+    asked = [product for product in products if attribute(product, "Representation")]
     no_part = left_out_by_class(file)
     solids, contexts, left_out, lost = _sort_out(asked, no_part)
     skipped = {step_id for step_id in solids if ids[step_id] in skip}
@@ -180,8 +180,8 @@ def _contents(
     findings: Findings,
     storeys: list[dict[str, Any]],
 ) -> dict[str, list[dict[str, Any]]]:
-    spaces = [product for product in products if product.is_a("IfcSpace")]
-    voids = [product for product in products if product.is_a("IfcFeatureElementSubtraction")]
+    spaces = [product for product in products if is_kind(product, "IfcSpace")]
+    voids = [product for product in products if is_kind(product, "IfcFeatureElementSubtraction")]
     apart = {product.id() for product in (*spaces, *voids)}
     others = [product for product in products if product.id() not in apart]
     element_rows = [rows.element(product) for product in others]
@@ -197,7 +197,7 @@ def _contents(
             f"the file has no storeys; one was made at {storeys[0]['elevation']:.3f} m, the lowest floor.",
             hint="Export storeys (levels).",
         )
-    door_rows = [rows.door(product) for product in others if product.is_a("IfcDoor")]
+    door_rows = [rows.door(product) for product in others if is_kind(product, "IfcDoor")]
     connector_rows, without = rows.connectors(others)
     findings.about_contents(element_rows, space_rows, door_rows, without)
     return {

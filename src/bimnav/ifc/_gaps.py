@@ -10,6 +10,7 @@ from typing import Any
 
 from bimnav.ifc._extent import extent_of
 from bimnav.ifc._findings import Findings
+from bimnav.ifc._kernel import attribute
 from bimnav.ifc._model import Model
 from bimnav.ifc._products import derived_id, identify, is_body, is_global_id, sorted_of
 
@@ -19,6 +20,7 @@ _DANGLING = re.compile(r"Instance reference #(\d+) used by instance #(\d+) at at
 _STATEMENT = re.compile(rb"#\s*+(\d++)\s*+=[^;]*+;")
 _TOKEN = re.compile(rb"'[^']*+'|/\*.*?\*/|[()]|[^(),'\s]++", re.DOTALL)
 _HOLE = re.compile(rb"(?<=[(,])\s*+(?:\([^()'$*]*+[$*]|[$*]\s*+,\s*+\()")  # perhaps: $ in a list within a list
+_SOUND = re.compile(rb"\s*+\#\d++=\w++\((?:[^()'/;]++|\((?:\#\d++,?+)++\))*+\);")  # its lists hold references alone
 _PLACEMENT, _BODY = "5", "6"  # attributes of every product
 _GEOMETRY = (
     "IfcObjectPlacement",
@@ -80,7 +82,8 @@ def _torn(text: bytes, *, has_complained: bool) -> Iterator[int]:
         statements = _STATEMENT.finditer(text)
     else:
         starts = (text.rfind(b";", 0, match.start()) + 1 for match in _HOLE.finditer(text))
-        statements = (match for start in starts if (match := _STATEMENT.search(text, start)))
+        doubtful = (start for start in starts if not _SOUND.match(text, start))
+        statements = (match for start in doubtful if (match := _STATEMENT.search(text, start)))
     yield from dict.fromkeys(int(match[1]) for match in statements if _is_torn(match[0]))
 
 
@@ -119,7 +122,7 @@ def note_lost(model: Model, file: Any, broken: Mapping[int, str], shaped: Mappin
         Step id to class and GlobalId of all products that have a representation by the text.
     """
     tables, ledger = model.tables, model.tables["ledger"]
-    asked = {product.id(): product for product in sorted_of(file, "IfcProduct") if product.Representation}
+    asked = {p.id(): p for p in sorted_of(file, "IfcProduct") if attribute(p, "Representation")}
     unseen = sorted((shaped.keys() | broken.keys()) - asked.keys())
     if not broken and not unseen:
         return

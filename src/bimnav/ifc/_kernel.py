@@ -21,12 +21,15 @@ __all__ = [
     "THOROUGH",
     "Entity",
     "File",
+    "attribute",
     "check_size",
+    "is_kind",
     "iterate",
     "mesh_of",
     "new_log",
     "one_by_one",
     "settings_for",
+    "written",
 ]
 
 Entity = Any  # an ifcopenshell.entity_instance; what attributes it has depends on its class
@@ -36,8 +39,40 @@ FAST = "cgal-simple"  # 5 to 30 times faster than OpenCASCADE, but knows neither
 THOROUGH = "opencascade"
 _LARGEST = 1e5  # metres; no product of a building is longer than 100 km
 
+_ABSENT, _ELSEWHERE = -1, -2  # instead of a place: there is none of that name; it is derived, or leads back
+_PLACES: dict[tuple[str, str], int] = {}  # schema with class, and attribute
+_KINDS: dict[tuple[str, str], bool] = {}  # schema with class, and another class
+
 _ifc: Any = ifcopenshell
 _geom: Any = ifcopenshell.geom
+
+
+def attribute(entity: Entity, name: str) -> Any:
+    """Return an attribute of an entity as `getattr` does, but find out only once where it stands in a class."""
+    stands = _place_of(entity, name)
+    return entity.get_argument(stands) if stands >= 0 else getattr(entity, name)
+
+
+def written(entity: Entity, name: str) -> Any:
+    """Return an attribute of an entity; None if its class has none of that name."""
+    stands = _place_of(entity, name)
+    return entity.get_argument(stands) if stands >= 0 else None if stands == _ABSENT else getattr(entity, name, None)
+
+
+def _place_of(entity: Entity, name: str) -> int:
+    key = entity.is_a(True), name
+    if key not in _PLACES:
+        category = entity.get_attribute_category(name)
+        _PLACES[key] = entity.get_argument_index(name) if category == 1 else _ABSENT if category == 0 else _ELSEWHERE
+    return _PLACES[key]
+
+
+def is_kind(entity: Entity, name: str) -> bool:
+    """Tell as `is_a` does whether an entity is of a class, but find out only once for all of its own class."""
+    key = entity.is_a(True), name
+    if key not in _KINDS:
+        _KINDS[key] = bool(entity.is_a(name))
+    return _KINDS[key]
 
 
 def new_log() -> Any:

@@ -144,7 +144,11 @@ def _shapes_of(model: Model) -> list[Shape]:
         )
         for i, row in enumerate(model.tables["meshes"])
     ]
-    return [
-        Shape(meshes[mesh], placement)
-        for mesh, placement in zip(arrays["shape_mesh"], arrays["placements"], strict=True)
-    ]
+    shapes: list[Shape] = [None] * len(arrays["shape_mesh"])  # type: ignore[list-item]
+    order = np.argsort(arrays["shape_mesh"], kind="stable")
+    ends = np.searchsorted(arrays["shape_mesh"][order], np.arange(len(meshes) + 1)).tolist()
+    for mesh, begin, end in zip(meshes, ends[:-1], ends[1:], strict=True):
+        which = order[begin:end]
+        for index, shape in zip(which.tolist(), Shape.copies(mesh, arrays["placements"][which]), strict=True):
+            shapes[index] = shape
+    return shapes

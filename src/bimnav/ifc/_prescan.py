@@ -1,4 +1,4 @@
-"""A first look at a model in plain Python: refuses what would crash, hang or mislead the kernel.
+"""A first look at a model before the kernel's: refuses what would crash, hang or mislead the kernel.
 
 The kernel opens damaged files without a word and dies on circular ones. One pass over the text finds
 both, names the place, and counts the products independently of the kernel.
@@ -12,6 +12,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bimnav.errors import (
     BimnavError,
@@ -152,9 +155,11 @@ class _Scan:
 
     def run(self, beat: Callable[[int, int], None] | None) -> Prescan:
         schema, start = self._header()
-        instances = self._statements(start, beat)
-        self._check_placements()
-        self._check_chains(self.pending, self.depth, "refers to itself")
+        instances = self._if_plain_and_sound(start)
+        if instances is None:
+            instances = self._statements(start, beat)
+            self._check_placements()
+            self._check_chains(self.pending, self.depth, "refers to itself")
         self._check_chains(self.parts, {}, "is a part of itself")
         scale = self._unit_scale()
         shaped = {
@@ -163,6 +168,44 @@ class _Scan:
             if shape in self.shapes or (self.follow and shape not in self.depth and shape not in self.pending)
         }
         return Prescan(schema, scale, instances, shaped)
+
+    def _if_plain_and_sound(self, start: int) -> int | None:
+        """Do what `_statements` and the checks after it do, many times faster; None for what these should look at.
+
+        Only products that have a representation become candidates.
+        """
+        compiled = _compiled()
+        found = compiled.survey(self.text, start) if compiled and self.follow else None
+        if not compiled or found is None or not _END.match(self.text, found.end):
+            return None
+        order = np.argsort(found.numbers, kind="stable")
+        ordered = found.numbers[order]
+        if (np.diff(ordered) <= 0).any():
+            return None
+        names = [self.text[begin:end] for begin, end in found.names.tolist()]
+        roles = np.array([_role_of(name, compiled) for name in names], dtype=np.int64)[found.kinds]
+        if compiled.has_loops_or_gaps(_rows_of(found.references, ordered, order), found.firsts, roles, DEPTH_LIMIT):
+            return None
+
+        def entity(row: int) -> tuple[int, bytes, bytes]:
+            begin, end = found.bodies[row].tolist()
+            return int(found.numbers[row]), names[found.kinds[row]], self.text[begin:end]
+
+        is_shape = np.array([name in _REPRESENTATIONS for name in names], dtype=np.bool_)
+        is_unit = np.array([name in _OF_UNITS for name in names], dtype=np.bool_)
+        joins = np.array([name in _PART_OF for name in names], dtype=np.bool_)
+        is_other = np.array([name not in _FLAT and name[:6] != b"IFCREL" for name in names], dtype=np.bool_)
+        is_other &= ~(is_shape | is_unit)
+        self.shapes.update(found.numbers[is_shape[found.kinds]].tolist())
+        for row in np.flatnonzero(is_unit[found.kinds] | (joins[found.kinds] & found.has_text)).tolist():
+            self._note(*entity(row))
+        rows = np.flatnonzero(is_other[found.kinds] & (found.sevenths >= 0))
+        shapes = _rows_of(found.sevenths[rows], ordered, order)
+        rows = rows[(shapes < 0) | is_shape[found.kinds[shapes]]]  # one that is not there is for the reader to miss
+        columns = (found.numbers[rows], found.kinds[rows], found.marks[rows], found.sevenths[rows])
+        for number, kind, (begin, end), shape in zip(*(column.tolist() for column in columns), strict=True):
+            self.candidates.append((number, names[kind], self.text[begin:end], shape))
+        return len(found.numbers)
 
     # header
 
@@ -412,6 +455,29 @@ class _Scan:
             context["line"] = self.text.count(newline, 0, at) + 1
             what += f" (line {context['line']})"
         raise error(f"{self.name} {what}.", hint, {"file": self.name, **context})
+
+
+def _compiled() -> Any:
+    """Return the compiled look, or None if it cannot be loaded: it takes a lot of memory."""
+    try:
+        from bimnav.ifc import _survey
+    except (ImportError, MemoryError, OSError):
+        return None
+    return _survey
+
+
+def _role_of(name: bytes, compiled: Any) -> int:
+    if name in _FLAT or name[:6] == b"IFCREL":
+        return int(compiled.FLAT)
+    return int(compiled.PLACEMENT if name == b"IFCLOCALPLACEMENT" else compiled.FOLLOWED)
+
+
+def _rows_of(numbers: NDArray[np.int64], ordered: NDArray[np.int64], order: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the rows of entities by their numbers; -1 where there is none."""
+    if not len(ordered):
+        return np.full(len(numbers), -1)
+    places = np.minimum(np.searchsorted(ordered, numbers), len(ordered) - 1)
+    return np.where(ordered[places] == numbers, order[places], -1)
 
 
 def _strip(body: bytes) -> bytes:

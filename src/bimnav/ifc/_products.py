@@ -10,7 +10,7 @@ from typing import Any
 
 import ifcopenshell.guid
 
-from bimnav.ifc._kernel import Entity, File
+from bimnav.ifc._kernel import Entity, File, attribute
 
 __all__ = [
     "BodyFinder",
@@ -134,7 +134,7 @@ def identify(products: Sequence[Entity]) -> tuple[dict[int, str], list[int]]:
     """
     ids: dict[int, str] = {}
     for product in products:
-        written = str(product.GlobalId)
+        written = str(attribute(product, "GlobalId"))
         if is_global_id(written):
             ids.setdefault(product.id(), written)
     first: dict[str, int] = {}
@@ -187,6 +187,7 @@ class BodyFinder:
 
     def __init__(self) -> None:
         self._mapped: dict[int, dict[int, Entity]] = {}
+        self._sources: dict[int, int] = {}  # a map to what it maps
         self._is_solid: dict[str, bool] = {}  # by class: `is_a` is too slow to ask for every item
 
     def solids_of(self, product: Entity) -> tuple[list[Entity], set[int]]:
@@ -199,23 +200,20 @@ class BodyFinder:
         """
         solids: dict[int, Entity] = {}
         contexts: set[int] = set()
-        for representation in _some(product.Representation.Representations):
-            if is_body(representation.RepresentationIdentifier):
+        for representation in _some(attribute(attribute(product, "Representation"), "Representations")):
+            if is_body(attribute(representation, "RepresentationIdentifier")):
                 found = self._solid_items(representation)
                 solids |= found
-                if found and representation.ContextOfItems is not None:
-                    contexts.add(representation.ContextOfItems.id())
+                if found and (context := attribute(representation, "ContextOfItems")) is not None:
+                    contexts.add(context.id())
         return list(solids.values()), contexts
 
     def _solid_items(self, representation: Entity) -> dict[int, Entity]:
         found: dict[int, Entity] = {}
-        for item in _some(representation.Items):
+        for item in _some(attribute(representation, "Items")):
             name = item.is_a()
             if name == "IfcMappedItem":
-                source = item.MappingSource.MappedRepresentation
-                if source.id() not in self._mapped:
-                    self._mapped[source.id()] = self._solid_items(source)
-                found |= self._mapped[source.id()]
+                found |= self._items_of(attribute(item, "MappingSource"))
                 continue
             if name not in self._is_solid:
                 if not item.is_a("IfcRepresentationItem"):
@@ -226,6 +224,15 @@ class BodyFinder:
         if not found and str(representation.RepresentationType).casefold() in _OF_SOLIDS:
             raise TypeError(f"{representation.RepresentationType} without a solid")
         return found
+
+    def _items_of(self, mapped: Entity) -> dict[int, Entity]:
+        step_id = mapped.id()
+        if step_id not in self._sources:
+            source = mapped.MappedRepresentation
+            if source.id() not in self._mapped:
+                self._mapped[source.id()] = self._solid_items(source)
+            self._sources[step_id] = source.id()
+        return self._mapped[self._sources[step_id]]
 
 
 def _some(items: Any) -> tuple[Entity, ...]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -56,6 +58,11 @@ def read(
     check
         Whether to look through the text first.
     """
+    with _uncollected():
+        return _read(path, folder, listener, check, {"skip": skip, "thorough": thorough, "careful": careful})
+
+
+def _read(path: Path, folder: Path, listener: Listener, check: bool, how: dict[str, Any]) -> Model:
     listener.stage("checking")
     text = load(path)
     said = scan(text, path.name, beat=lambda *_: listener.stage("checking")) if check else None
@@ -69,7 +76,7 @@ def read(
     broken = broken_products(file, text, log)
     listener.stage("reading")
     try:
-        model = extract(file, text, heartbeat=listener.beat, skip=skip, thorough=thorough, careful=careful, log=log)
+        model = extract(file, text, heartbeat=listener.beat, log=log, **how)
     except (IfcStructureError, IfcUnitsError) as error:  # which do not know the name
         raise type(error)(f"{path.name}: {error.message}", error.hint, {"file": path.name, **error.context}) from error
     except GeometryError as error:  # nobody foresaw it: as good as a crash at the product in hand
@@ -77,6 +84,18 @@ def read(
     listener.stage("finishing")
     note_lost(model, file, broken, said.shaped if said else {})
     return model
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Do not look for circular garbage: a reading makes none, and the search goes through all it has made."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def open_copy(text: bytes, copy: Path, name: str) -> tuple[Any, Any]:

@@ -6,13 +6,13 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from ifcopenshell.util.placement import get_local_placement
 from numpy.typing import NDArray
 
-from bimnav.ifc._kernel import Entity, File
+from bimnav.ifc._kernel import Entity, File, attribute, is_kind, written
 from bimnav.ifc._products import derived_id, sorted_of
 from bimnav.ifc._relations import Relations
 
@@ -109,6 +109,8 @@ class Rows:
         self._storeys = {storey.id() for storey in sorted_of(file, "IfcBuildingStorey")}
         self._spatial = {each.id() for each in sorted_of(file, "IfcSpatialElement", "IfcSpatialStructureElement")}
         self._spaces = {space.id() for space in sorted_of(file, "IfcSpace")}
+        self._types: dict[int, Row] = {}
+        self._held: dict[tuple[int, str], str | None] = {}
         self._fillings: dict[int, list[int]] = defaultdict(list)
         for filling, opening in sorted(relations.fills.items()):
             self._fillings[opening].append(filling)
@@ -116,19 +118,15 @@ class Rows:
     def element(self, product: Entity) -> Row:
         """Describe a product that is neither space nor opening."""
         step_id = product.id()
-        kind = self._relations.kind.get(step_id)
         whole = self._relations.whole.get(step_id)
         return {
             "global_id": self._ids[step_id],
             "ifc_class": product.is_a(),
-            "name": text_of(product.Name),
-            "type_name": text_of(kind.Name) if kind else "",
-            "type_class": kind.is_a() if kind else "",
-            "object_type": text_of(getattr(product, "ObjectType", None)),
-            "predefined_type": _predefined_type(product, kind),
-            "tag": text_of(getattr(product, "Tag", None)),
-            "storey": self._nearest(step_id, self._storeys),
-            "space": self._nearest(step_id, self._spaces),
+            "name": text_of(attribute(product, "Name")),
+            **self._typed(product),
+            "tag": text_of(written(product, "Tag")),
+            "storey": self._nearest(step_id, "storey"),
+            "space": self._nearest(step_id, "space"),
             "parent": None if whole in self._spatial else self._ids.get(whole or 0),
             "step_id": step_id,
             "shapes": self._shapes(step_id),
@@ -136,16 +134,12 @@ class Rows:
 
     def space(self, space: Entity) -> Row:
         """Describe a room."""
-        kind = self._relations.kind.get(space.id())
         return {
             "global_id": self._ids[space.id()],
             "name": text_of(space.Name),
             "long_name": text_of(space.LongName),
-            "type_name": text_of(kind.Name) if kind else "",
-            "type_class": kind.is_a() if kind else "",
-            "object_type": text_of(space.ObjectType),
-            "predefined_type": _predefined_type(space, kind),
-            "storey": self._nearest(space.id(), self._storeys),
+            **self._typed(space),
+            "storey": self._nearest(space.id(), "storey"),
             "step_id": space.id(),
             "shapes": self._shapes(space.id()),
         }
@@ -195,8 +189,31 @@ class Rows:
             )
         return rows, shapeless
 
-    def _nearest(self, step_id: int, wanted: set[int]) -> str | None:
-        return next((self._ids[above] for above in self._relations.above(step_id) if above in wanted), None)
+    def _typed(self, product: Entity) -> Row:
+        """Describe the kind of a product: by its type object, of which many share one, and by its own words."""
+        kind = self._relations.kind.get(product.id())
+        known = kind.id() if kind else 0
+        if known not in self._types:
+            self._types[known] = {
+                "type_name": text_of(kind.Name) if kind else "",
+                "type_class": kind.is_a() if kind else "",
+                "object_type": "",
+                "predefined_type": _own_type(kind, "ElementType") if kind else "",
+            }
+        row = self._types[known] | {"object_type": text_of(written(product, "ObjectType"))}
+        row["predefined_type"] = row["predefined_type"] or _own_type(product, "ObjectType")
+        return row
+
+    def _nearest(self, step_id: int, wanted: Literal["storey", "space"]) -> str | None:
+        """Return the GlobalId of the nearest storey or space that holds a product; many are held by one thing."""
+        holder = next(self._relations.above(step_id), None)
+        if holder is None:
+            return None
+        if (holder, wanted) not in self._held:
+            places = self._storeys if wanted == "storey" else self._spaces
+            held_by = (above for above in (holder, *self._relations.above(holder)) if above in places)
+            self._held[holder, wanted] = next((self._ids[above] for above in held_by), None)
+        return self._held[holder, wanted]
 
     def _connector_kind(self, product: Entity) -> str | None:
         kind = _BY_CLASS.get(product.is_a())
@@ -204,7 +221,7 @@ class Rows:
         if kind == "lift":
             stated = getattr(product, "OperationType", None) or _predefined_type(product, typed)
             return _TRANSPORT.get(stated, "lift")
-        if kind is None and any(product.is_a(name) for name in _LIFT_CLASSES):
+        if kind is None and any(is_kind(product, name) for name in _LIFT_CLASSES):
             words = " ".join(text_of(v) for v in (product.Name, product.ObjectType, typed and typed.Name))
             return "lift" if _LIFT.search(words) and not _DOOR.search(words) else None
         return kind
@@ -222,13 +239,14 @@ class Rows:
 
 def _predefined_type(product: Entity, kind: Entity | None) -> str:
     """Return the predefined type, the type object's first; a user's own word where it says so."""
-    for owner, own_word in ((kind, "ElementType"), (product, "ObjectType")):
-        value = getattr(owner, "PredefinedType", None)
-        if value == "USERDEFINED":
-            value = getattr(owner, own_word, None)
-        if value and value != "NOTDEFINED":
-            return str(value)
-    return ""
+    return (_own_type(kind, "ElementType") if kind else "") or _own_type(product, "ObjectType")
+
+
+def _own_type(owner: Entity, own_word: str) -> str:
+    value = written(owner, "PredefinedType")
+    if value == "USERDEFINED":
+        value = written(owner, own_word)
+    return str(value) if value and value != "NOTDEFINED" else ""
 
 
 def derived_storey(file: File, elevation: float) -> Row:

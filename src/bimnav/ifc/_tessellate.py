@@ -109,8 +109,10 @@ class Tessellator:
         is clipped by our own means or handed to the thorough one; the better of the two readings counts.
         """
         trusted = [product for product in products if product.id() not in self._thorough]
-        readings = {product.id(): Reading() for product in products} | self._read_past(trusted)
-        readings |= self._iterate([p for p in trusted if not readings[p.id()].shapes], FAST)
+        past = self._read_past(trusted)
+        fast = self._iterate([p for p in trusted if p.id() not in past or not past[p.id()].shapes], FAST)
+        known = past | fast
+        readings = {step_id: known.get(step_id) or Reading() for step_id in (product.id() for product in products)}
         doubtful = [product for product in products if not self._is_complete(product, readings)]
         clipped = self._clip_all([product for product in doubtful if product.id() not in self._thorough])
         readings |= clipped
@@ -129,11 +131,10 @@ class Tessellator:
 
     def missing_items(self, step_id: int, reading: Reading) -> list[Entity]:
         """Return the items of a product's body that left no triangle."""
-        return [item for item in self._solids[step_id] if not self._left_triangles(item, reading.items)]
+        unseen = [item for item in self._solids[step_id] if item.id() not in reading.items]
+        return [item for item in unseen if not self._left_triangles(item, reading.items)]
 
     def _left_triangles(self, item: Entity, seen: set[int]) -> bool:
-        if item.id() in seen:
-            return True
         shells = getattr(item, "FbsmFaces", None) or getattr(item, "SbsmBoundary", None) or ()
         if any(shell.id() in seen for shell in shells):
             return all(shell.id() in seen for shell in shells)
@@ -166,10 +167,10 @@ class Tessellator:
 
     def _take_shape(self, shape: Any, reading: Reading, key: tuple[str, bool, str]) -> None:
         geometry = shape.geometry
-        if not geometry.faces_buffer:
+        if key not in self._known and not geometry.faces_buffer:
             return
         placement = get_shape_matrix(shape).copy()
-        if not np.isfinite(placement).all() or np.abs(placement).max() > _FARTHEST:
+        if not np.abs(placement).max() <= _FARTHEST:
             reading.errors.append("its placement is not finite, or out of range")
             return
         if key not in self._known:
