@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import bimnav as bn
+from bimnav.cli import main
 from bimnav.errors import FileMissingError, RobotError
 from bimnav.robots import VARIABLE, list_robots, load_robot, robot_named, robot_schema
 from tests.conftest import REPOSITORY
@@ -236,3 +237,10 @@ def test_the_schema_of_robot_files_takes_what_is_taken_and_refuses_what_is_refus
         text = f"[robots.a]\n{line}\n"
         judge.validate(tomllib.loads("schema = 1\n" + text))
         load_robot(write(text))
+
+
+def test_a_name_that_is_nearly_a_profile_is_taken_with_a_warning(capsys):
+    assert main(["run", str(bn.sample("apartment")), "--robot", "scruber", "--json"]) == 0
+    captured = capsys.readouterr()
+    assert "did you mean 'scrubber'" in captured.err
+    assert '"name": "scruber"' in captured.out

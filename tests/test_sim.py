@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from bimnav.errors import MissingExtraError, OutputError, SimulationError, ValueRangeError
+from bimnav.errors import InputError, MissingExtraError, OutputError, SimulationError, ValueRangeError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell, GridFrame
 from bimnav.robot import Robot
@@ -578,3 +578,13 @@ def test_a_tour_that_nothing_can_disturb_is_played_as_if_something_could(case):
     assert slowly.tallies == result.tallies
     for name in ("times", "points", "statuses", "storeys", "stops", "eases", "turns"):
         np.testing.assert_array_equal(getattr(slowly.track, name), getattr(result.track, name))
+
+
+def test_the_graph_and_the_robots_may_be_given_in_their_places():
+    graph = NavGraph.from_mask(np.ones((3, 9), dtype=bool))
+    from bimnav import plan_tour
+
+    tour = plan_tour(graph, Cell(0, 1, 1), [])
+    assert simulate(tour, graph, [Robot("A")]).robot.name == "A"
+    with pytest.raises(InputError, match="another graph"):
+        simulate(tour, NavGraph.from_mask(np.ones((3, 8), dtype=bool)))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import bimnav as bn
 from bimnav._wording import printable
-from bimnav.cli._shared import DONE, INCOMPLETE, length, place, show, show_json, target
+from bimnav.cli._shared import DONE, INCOMPLETE, length, place, show, show_json, target, warn
 from bimnav.detections import read_targets
 
 if TYPE_CHECKING:
@@ -122,8 +123,12 @@ def _command(options: argparse.Namespace) -> int:
 
 def _robot(options: argparse.Namespace) -> bn.Robot:
     """Return the profile that is named, with what else was said of the robot."""
-    from bimnav.robots import robot_named
+    from bimnav.robots import list_robots, robot_named
 
+    known = [profile.name for profile in list_robots()]
+    near = difflib.get_close_matches(options.robot, known, 1, cutoff=0.8)
+    if near and options.robot not in known:
+        warn(f"robot {options.robot!r} is no profile, and so a plain robot of that name; did you mean {near[0]!r}?")
     said = {name: getattr(options, name) for name in ("radius", "height", "speed")}
     said = {name: value for name, value in said.items() if value is not None}
     if "radius" in said:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,11 @@ def argument(read: Callable[[str], Any], name: str) -> Callable[[str], Any]:
 length = argument(parse_length, "length")
 place = argument(parse_place, "place")
 target = argument(parse_target, "target")
+
+
+def warn(text: str) -> None:
+    """Write a line to standard error."""
+    print(f"bimnav: {printable(text)}", file=sys.stderr)  # noqa: T201
 
 
 def show(text: str) -> None:

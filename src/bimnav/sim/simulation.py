@@ -48,9 +48,10 @@ class Plan(Protocol):
 
 def simulate(
     plan: Tour | Sequence[Tour] | Plan,
+    graph: NavGraph | None = None,
+    robots: Sequence[Robot] | None = None,
     *,
     robot: Robot | None = None,
-    robots: Sequence[Robot] | None = None,
     events: Iterable[Change] = (),
     people: Iterable[Person] = (),
     doors: Iterable[SimDoor] = (),
@@ -80,6 +81,8 @@ def simulate(
     ----------
     plan
         A tour, several, or a plan with `tours`; `plan_tour` makes a tour.
+    graph
+        What the plan was made on. The plan knows it; one that is given must be the same.
     robot, robots
         Who does it. The default is the robot of the plan, else the one the environment was made for; several
         are then called after it, with numbers. Names differ.
@@ -133,6 +136,8 @@ def simulate(
         If robots, or people, share a name, or their number is not that of the tours.
     """
     tours = _tours_of(plan)
+    if graph is not None and any(tour.graph.frame != graph.frame for tour in tours):
+        raise InputError("the plan was made on another graph.", "Give the graph it was made on, or none.")
     starts = _starts(start_time, len(tours))
     fleet = _fleet(plan, tours, robot, robots)
     events, people = tuple(events), tuple(people)
