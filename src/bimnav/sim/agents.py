@@ -611,7 +611,8 @@ class RobotAgent:
         cabin = self.world.cabins[stretch.lift or ""]
         goal = int(stretch.storeys[-1])
         self.halt(RobotStatus.WAITING, "call_lift", errand, cabin.lift.name)
-        rider = cabin.call(self.storey, goal)
+        level = float(np.linalg.norm(np.diff(stretch.points[:, :2], axis=0), axis=1).sum())  # into the cabin and out
+        rider = cabin.call(self.storey, goal, level / 2 / self.cruise)
         yield rider.boarded
         begin = float(self.world.clock.now)
         self.note("board_lift", errand.stop, cabin.lift.name)
@@ -621,6 +622,8 @@ class RobotAgent:
             self.recorder.add(begin, carried, self.status, errand.index)
         x, y, z = stretch.points[-1].tolist()
         self.place, self.storey = (x, y, z), goal
+        self.distance += level
+        self.leg_distance += level
         self.become(RobotStatus.MOVING)
         self.note("leave_lift", errand.stop, cabin.lift.name)
         self.run_down()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import shapely
@@ -150,25 +150,25 @@ def clearance_to_walls(
     return best
 
 
-def _boxes(way: _Way) -> tuple[float, NDArray[np.float64], list[set[int]]]:
-    """Return the begin, and for every window the box (x0, y0, x1, y1) around the way and its storeys."""
+_Boxes: TypeAlias = tuple[float, NDArray[np.float64], NDArray[np.int64]]
+
+
+def _boxes(way: _Way) -> _Boxes:
+    """Return the begin, and for every window the box (x0, y0, x1, y1) around the way and a bit for every storey."""
     begin = float(way.times[0])
     edges = np.arange(begin, float(way.times[-1]) + _WINDOW, _WINDOW)
-    boxes, storeys = np.empty((len(edges), 4)), []
+    boxes, storeys = np.empty((len(edges), 4)), np.empty(len(edges), dtype=np.int64)
+    bits = np.int64(1) << (way.storeys.astype(np.int64) % 63)  # high buildings share bits, and are looked at closer
     for k, edge in enumerate(edges.tolist()):
         first = max(int(np.searchsorted(way.times, edge, side="right")) - 1, 0)
         last = int(np.searchsorted(way.times, edge + _WINDOW, side="left")) + 1
         points = way.points[first:last]
         boxes[k] = (*points.min(axis=0), *points.max(axis=0))
-        storeys.append(set(way.storeys[first:last].tolist()))
+        storeys[k] = np.bitwise_or.reduce(bits[first:last])
     return begin, boxes, storeys
 
 
-def _windows(
-    a: tuple[float, NDArray[np.float64], list[set[int]]],
-    b: tuple[float, NDArray[np.float64], list[set[int]]],
-    distance: float,
-) -> list[tuple[float, float]]:
+def _windows(a: _Boxes, b: _Boxes, distance: float) -> list[tuple[float, float]]:
     """Return the spans of time in which two ways may come nearer than a distance.
 
     Before its begin and after its end a robot stands; its first and last boxes hold then, too.
@@ -177,13 +177,15 @@ def _windows(
     end = max(a[0] + len(a[1]) * _WINDOW, b[0] + len(b[1]) * _WINDOW)
     edges = np.arange(begin, end, _WINDOW)
     near = np.ones(len(edges), dtype=np.bool_)
-    rows = []
-    for start, boxes, _ in (a, b):
+    rows, floors = [], []
+    for start, boxes, storeys in (a, b):
         low = np.clip(np.floor((edges - start) / _WINDOW).astype(int), 0, len(boxes) - 1)
         high = np.clip(np.floor((edges + _WINDOW - start) / _WINDOW).astype(int), 0, len(boxes) - 1)
         rows.append(
             np.column_stack([np.minimum(boxes[low], boxes[high])[:, :2], np.maximum(boxes[low], boxes[high])[:, 2:]])
         )
+        floors.append(storeys[low] | storeys[high])
+    near &= (floors[0] & floors[1]) != 0
     for axis in (0, 1):
         gap = np.maximum(rows[0][:, axis] - rows[1][:, axis + 2], rows[1][:, axis] - rows[0][:, axis + 2])
         near &= gap < distance
@@ -192,7 +194,10 @@ def _windows(
 
 def _gaps(a: _Way, b: _Way, begin: float, end: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return moments, and the least distance between two ways from each to the next; inf on different storeys."""
-    inner = [way.times[(way.times > begin) & (way.times < end)] for way in (a, b)]
+    inner = [
+        way.times[np.searchsorted(way.times, begin, side="right") : np.searchsorted(way.times, end, side="left")]
+        for way in (a, b)
+    ]
     moments = np.unique(np.concatenate([[begin, end], *inner]))
     gap = _at(a, moments) - _at(b, moments)
     if len(moments) == 1:

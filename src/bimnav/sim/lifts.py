@@ -34,6 +34,9 @@ class Lift:
         How many robots fit.
     storey
         Where the cabin waits in the beginning.
+    depth
+        Metres of a route before and behind the middle of the cabin that belong to the ride: robots wait this far
+        away until it has come, and go in and out while it stops.
     """
 
     name: str
@@ -44,25 +47,30 @@ class Lift:
     door_time: float = 4.0
     capacity: int = 1
     storey: int = 0
+    depth: float = 0.0
 
     def __post_init__(self) -> None:
-        times = (self.travel_time, self.door_time, self.reach)
+        times = (self.travel_time, self.door_time, self.reach, self.depth)
         if self.capacity < 1 or not all(0 <= value < math.inf for value in times):
             raise ValueRangeError(
                 f"lift {self.name!r}: travel_time {self.travel_time}, door_time {self.door_time}, "
-                f"reach {self.reach}, capacity {self.capacity}.",
+                f"reach {self.reach}, depth {self.depth}, capacity {self.capacity}.",
                 "Give seconds and metres of 0 or more, and a capacity of at least 1.",
             )
 
 
 @dataclass(slots=True, eq=False)
 class Rider:
-    """Somebody who waits for a lift, or rides in it."""
+    """Somebody who waits for a lift, or rides in it.
+
+    `seconds` is what they take to get in, and again to get out, beside what the doors take.
+    """
 
     origin: int
     goal: int
     boarded: simpy.Event
     arrived: simpy.Event
+    seconds: float = 0.0
 
 
 @dataclass(slots=True)
@@ -93,9 +101,9 @@ class Cabin:
         self.called = self.clock.event()
         self.clock.process(self.run())
 
-    def call(self, origin: int, goal: int) -> Rider:
-        """Ask for a ride between two storeys."""
-        rider = Rider(origin, goal, self.clock.event(), self.clock.event())
+    def call(self, origin: int, goal: int, seconds: float = 0.0) -> Rider:
+        """Ask for a ride between two storeys, which takes some seconds to get in and to get out."""
+        rider = Rider(origin, goal, self.clock.event(), self.clock.event(), seconds)
         self.waiting.append(rider)
         if not self.called.triggered:
             self.called.succeed()
@@ -136,6 +144,7 @@ class Cabin:
             self.waiting.remove(rider)
             self.riding.append(rider)
             rider.boarded.succeed()
-        yield self.clock.timeout(self.lift.door_time)
+        moving = max((rider.seconds for rider in (*leaving, *boarding)), default=0.0)
+        yield self.clock.timeout(self.lift.door_time + moving)
         for rider in leaving:
             rider.arrived.succeed()

@@ -202,6 +202,8 @@ class SimResult:
         `makespan` (s), `distance` (m), seconds in every status of all robots, `energy` (J), `charge_distance`
         (m driven to chargers), `utilisation` (share of the robots' time that they drove, worked or charged),
         numbers of targets `served`, `given_up` and `unreached`, and `coverage`: the share of targets served.
+        If history was kept and there was anything to keep away from, `clearance`: the least metres from a robot's
+        body to walls, people and other robots.
         """
         seconds = {s: math.fsum(tally.seconds[s] for tally in self.tallies) for s in RobotStatus}
         busy = seconds[RobotStatus.MOVING] + seconds[RobotStatus.WORKING] + seconds[RobotStatus.CHARGING]
@@ -217,6 +219,7 @@ class SimResult:
             "given_up": len(self.given_up),
             "unreached": len(self.unreached),
             "coverage": len(self.served) / len(self.targets) if self.targets else 1.0,
+            **{name: value for name, value in self._closest() if math.isfinite(value)},
         }
 
     @cached_property
@@ -239,6 +242,9 @@ class SimResult:
             "people": clearance_to_people(self.robots, self.tracks, self._walkers),
             "robots": clearance_to_robots(self.robots, self.tracks),
         }
+
+    def _closest(self) -> list[tuple[str, float]]:
+        return [("clearance", min(self.clearance.values()))] if self.tracks else []
 
     # --- moments
 

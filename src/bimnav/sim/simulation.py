@@ -304,7 +304,8 @@ def _slow_doors(environment: IndoorEnvironment | None) -> list[SimDoor]:
 def _lifts_in(graph: NavGraph) -> tuple[Lift, ...]:
     """Return the lifts of a graph, as fast as it reckons with; each waits on the lowest storey it serves.
 
-    What a link takes beside the way to the cabin and out of it is the cabin's: travel, and a stop at both ends.
+    What a link takes beside the way into the cabin and out of it is the cabin's: travel, and a stop at both ends.
+    Who waits does so in front.
     """
     found: dict[str, Lift] = {}
     for link in sorted(getattr(graph, "connectors", ()), key=lambda link: min(link.begin, link.end)):
@@ -313,7 +314,9 @@ def _lifts_in(graph: NavGraph) -> tuple[Lift, ...]:
             continue
         ends = np.array([graph.frame.center_of(link.begin), graph.frame.center_of(link.end)])
         points = link.points if len(link.points) else ends
-        x, y, _ = points[np.abs(np.diff(points[:, 2])).argmax()].tolist()
+        rising = int(np.abs(np.diff(points[:, 2])).argmax())
+        x, y, _ = points[rising].tolist()
+        reached = np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
         climb, storeys = abs(float(ends[1, 2] - ends[0, 2])), abs(link.end.storey - link.begin.storey)
         seconds = max(graph.seconds_over(link) - graph.seconds_beside(link), 0.0)
         travel = min(climb / _LIFT_SPEED, seconds)
@@ -324,6 +327,7 @@ def _lifts_in(graph: NavGraph) -> tuple[Lift, ...]:
             travel_time=travel / storeys,
             door_time=(seconds - travel) / 2,
             storey=min(link.begin.storey, link.end.storey),
+            depth=float(max(reached[rising], reached[-1] - reached[rising + 1])),
         )
     return tuple(found.values())
 

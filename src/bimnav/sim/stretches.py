@@ -168,7 +168,8 @@ def _rides(line: Line, lifts: Sequence[Lift]) -> list[tuple[float, float, str]]:
         lift = next((lift for lift in lifts if (lift.x - x) ** 2 + (lift.y - y) ** 2 <= lift.reach**2), None)
         if lift is None:
             continue
-        begin, end = float(reached[k]), float(reached[k + 1])
+        begin = max(float(reached[k]) - lift.depth, 0.0)
+        end = min(float(reached[k + 1]) + lift.depth, float(reached[-1]))
         if rides and rides[-1][2] == lift.name and begin - rides[-1][1] <= JOINED:
             rides[-1] = (rides[-1][0], end, lift.name)
         else:
