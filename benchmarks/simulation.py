@@ -172,7 +172,8 @@ def main() -> None:
         peaks.append(tracemalloc.get_traced_memory()[1] / 1e6)
     tracemalloc.stop()
     lines += [
-        f"Memory without history, the tour itself included: {peaks[0]:.1f} MB for {count:,} stops, {peaks[1]:.1f} MB for twice as many.",
+        f"Memory without history, the tour itself included: {peaks[0]:.1f} MB for {count:,} stops, "
+        f"{peaks[1]:.1f} MB for twice as many.",
         "",
     ]
     sizes = [(5, 2)] if given.quick else [(10, 2), (50, 10)]
