@@ -82,7 +82,7 @@ class Path:
     legs: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
-        self.indices.flags.writeable = False
+        self.indices.setflags(write=False)
         if self.legs is not None:
             self.legs.flags.writeable = False
 
@@ -107,10 +107,10 @@ class Path:
         points: NDArray[np.float64] = search.centers(
             self.indices, frame.first_row, frame.first_col, frame.cell_size, np.array(frame.elevations)
         )
-        if self.rides:
+        if self.graph.connectors and self.rides:
             parts = np.split(points, [k + 1 for k, _ in self.rides])
             points = _along(self, parts)
-        points.flags.writeable = False
+        points.setflags(write=False)
         return points
 
     @cached_property
@@ -328,7 +328,8 @@ def _length(graph: NavGraph, indices: NDArray[np.int32]) -> float:
 
 def _index(graph: NavGraph, cell: Cell, role: str) -> int:
     try:
-        storey, row, col = map(operator.index, cell)
+        storey, row, col = cell
+        storey, row, col = operator.index(storey), operator.index(row), operator.index(col)
     except (TypeError, ValueError) as error:
         hint = "Give a Cell; `graph.frame.cell_at(x, y)` finds the one at a point."
         raise InputError(f"{role} is {cell!r}, which is no cell.", hint, {role: cell}) from error
@@ -339,7 +340,8 @@ def _index(graph: NavGraph, cell: Cell, role: str) -> int:
             f"The map has {storeys}, {rows} and {cols} storeys, rows and columns; `graph.frame.cell_at` finds cells.",
             {role: tuple(cell)},
         )
-    return int((storey * rows + row) * cols + col)
+    index: int = (storey * rows + row) * cols + col
+    return index
 
 
 def free_index(graph: NavGraph, cell: Cell, role: Literal["start", "goal"]) -> int:
