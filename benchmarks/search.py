@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -493,7 +494,11 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
     numbers = growth(chosen.tiny) if not chosen.only or "growth" in chosen.only else []
     packages = ("numba", "numpy", "scipy", "rustworkx", "pyastar2d")
     about = ", ".join(
-        [platform.machine(), f"Python {platform.python_version()}", *(f"{p} {version(p)}" for p in packages)]
+        [
+            platform.machine(),
+            f"Python {platform.python_version()}",
+            *(f"{p} {version(p)}" for p in packages if find_spec(p)),
+        ]
     )
     if chosen.json:
         chosen.json.write_text(json.dumps({"about": about, "rows": [asdict(row) for row in rows], "growth": numbers}))
