@@ -238,3 +238,19 @@ def test_a_world_without_a_building_has_a_replay_too(opened):
     result = bn.simulate(bn.plan_tour(graph, Cell(0, 1, 1), [Stop("id", "there", cell, point, point)]))
     page = opened(result)
     assert_robots_are_where_the_log_says(page, result)
+
+
+def test_what_is_simplified_in_a_large_building_is_said(cleaned, monkeypatch):
+    from bimnav.viewer import _scene
+
+    whole = _scene.scene_of(cleaned, None)
+    assert "boxes" not in whole["subtitle"]
+    monkeypatch.setattr(_scene, "_MOST_TRIANGLES", 500)
+    monkeypatch.setattr(_scene, "_MOST_FACTS", 10)
+    scene = _scene.scene_of(cleaned, None)
+    assert f"{scene['mesh']['boxed']} elements with the most triangles are drawn as boxes" in scene["subtitle"]
+    assert (
+        f"{len(scene['elements']) - 10} of {len(scene['elements'])} elements carry no properties" in scene["subtitle"]
+    )
+    assert scene["elements"][0]["id"] == whole["elements"][0]["id"]
+    assert sum(e["count"] for e in scene["elements"]) < sum(e["count"] for e in whole["elements"])

@@ -303,7 +303,7 @@ def _ordered(
     """Order stops, given by the cells they can be served from, their priority and when they are due."""
     cells = [start] if end is None else [start, end]
     group = list(range(len(cells)))
-    columns: list[Point] = [(0.0, math.inf, 0.0)] * len(cells)
+    columns: list[tuple[float, float, float]] = [(0.0, math.inf, 0.0)] * len(cells)
     for number, ((places, priority, due), stops) in enumerate(found, len(cells)):
         cells += places
         group += [number] * len(places)

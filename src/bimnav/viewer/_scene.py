@@ -66,7 +66,7 @@ def scene_of(result: SimResult, title: str | None) -> dict[str, Any]:
         subtitle = f"{len(result.served)} of {len(result.targets)} targets served, {result.distance:.1f} m driven"
     return {
         "title": title or heading,
-        "subtitle": subtitle,
+        "subtitle": subtitle + _simplified(elements, mesh),
         "origin": origin.tolist(),
         "levels": levels,
         "cut": _CUT if elements else None,
@@ -84,6 +84,13 @@ def scene_of(result: SimResult, title: str | None) -> dict[str, Any]:
         "events": _events(result),
         "span": [float(result.span[0]), float(result.span[1])],
     }
+
+
+def _simplified(elements: Sequence[dict[str, Any]], mesh: dict[str, Any]) -> str:
+    """Say what the page leaves out of a large building, if it does."""
+    boxed, bare = mesh["boxed"], len(elements) - _MOST_FACTS
+    told = f"; {boxed} elements with the most triangles are drawn as boxes" if boxed else ""
+    return told + (f"; {bare} of {len(elements)} elements carry no properties here" if bare > 0 else "")
 
 
 def _mm(value: float) -> float:
