@@ -23,6 +23,14 @@ def test_clearances_are_those_of_scipy_with_a_rim_to_the_last_bit(free):
         assert_array_equal(found, ndimage.distance_transform_edt(np.pad(plane, 1))[1:-1, 1:-1])
 
 
+@given(arrays.arrays(np.bool_, arrays.array_shapes(min_dims=3, max_dims=3, max_side=12)), st.integers(1, 2500))
+@settings(max_examples=150, deadline=None)
+def test_values_by_clearance_are_those_of_the_whole_transform(free, count):
+    values = np.arange(count, dtype=np.float32)
+    squared = np.round(np.square(search.clearances(free))).astype(int)
+    assert_array_equal(search.by_clearance(free, values), values[np.minimum(squared, count - 1)])
+
+
 @given(
     arrays.arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 150))),
     arrays.arrays(np.bool_, st.sampled_from([(1, 1), (3, 3), (5, 3), (1, 9), (3, 131)])),

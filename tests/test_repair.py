@@ -91,6 +91,8 @@ def test_small_changes_are_repaired_and_large_ones_searched_anew(weighted):
     cost.flat[wall] = math.inf
     assert not field.update(wall, math.inf)
     assert_array_equal(field.distances(1.0), search.distances(search.Layout(cost), np.array([source]), 1.0))
+    assert not field._marks.any()
+    assert (workspace().keys == search.compiled.NEVER).all()
 
 
 def test_a_change_that_changes_nothing_is_no_change():

@@ -16,7 +16,10 @@ from scipy.sparse.csgraph import dijkstra
 
 from bimnav import search
 from bimnav.search import compiled, lengths
-from bimnav.search.workspace import workspace
+from bimnav.search.astar import astar
+from bimnav.search.compiled import FULL
+from bimnav.search.flow import flood
+from bimnav.search.workspace import Workspace, workspace
 
 ROOT = math.sqrt(2)
 NO_LINKS = (), ()
@@ -329,3 +332,29 @@ def test_warming_up_uses_every_kernel():
             kernel = getattr(module, name)
             if hasattr(kernel, "signatures"):
                 assert kernel.signatures, f"{name} was not compiled"
+
+
+@pytest.mark.parametrize("dearest", [1.0, 30.0, 2000.0])
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_buckets_find_what_a_heap_finds(dearest, connectivity):
+    rng = np.random.default_rng(5)
+    cost = np.where(rng.random((2, 70, 90)) < 0.85, 1 + dearest * rng.random((2, 70, 90)), np.inf).astype(np.float32)
+    free = np.flatnonzero(np.isfinite(cost))
+    layout = search.Layout(cost, connectivity, rng.choice(free, (6, 2)), rng.uniform(2, 9, 6))
+    for sources in (free[:1], free[::7], free):
+        padded, space = layout.padded(sources), Workspace()
+        found = flood(
+            space, layout.cost, layout.moves, layout.steps[:connectivity], layout.links, layout.least,
+            layout.greatest, padded,
+        )  # fmt: skip
+        assert found is not None
+        outcome = FULL
+        while outcome == FULL:
+            stamp = space.begin(layout.moves.size)
+            outcome = astar(
+                *layout.astar_arguments, padded, np.zeros(0, np.int64), 0.0, space.costs, space.float_keys,
+                space.items, stamp,
+            )  # fmt: skip
+            space.grow_heap()
+        nodes = space.costs
+        assert_array_equal(found, np.where(nodes["stamp"] == stamp, nodes["length"], np.inf))

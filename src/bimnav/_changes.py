@@ -58,6 +58,8 @@ class Changes:
 
     def with_cost(self, factor: NDArray[np.float32]) -> Changes:
         """Return the record with other costs, (storeys, rows, cols), of what can be opened again."""
+        if not len(self.cells):
+            return self
         return replace(self, cost=np.where(np.isfinite(self.cost), factor.ravel()[self.cells], self.cost))
 
 

@@ -38,12 +38,10 @@ def clearance_factors(
         raise ValueRangeError(f"clearance is {metres}.", "Give metres, at least 0.")
     if not 0 <= weight < math.inf:
         raise ValueRangeError(f"the weight of a clearance is {weight}.", "Give a number of at least 0.")
-    squared = search.squared_clearances(free)
     # one factor for each squared distance, up to where nothing is missing; 0 is a blocked cell
     reach = min(metres / cell_size + 0.5, float(sum(free.shape)))
     away = np.sqrt(np.arange(math.ceil(reach * reach) + 2))
     missing = 1 - (away - 0.5) * (cell_size / max(metres, 1e-9))
     factor = (1 + weight * np.square(np.clip(missing, 0, 1))).astype(np.float32)
     factor[0] = 1
-    found: NDArray[np.float32] = factor[np.minimum(squared, len(factor) - 1, out=squared)]
-    return found
+    return search.by_clearance(free, factor)

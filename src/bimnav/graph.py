@@ -114,7 +114,7 @@ class NavGraph:
             if array.shape != self.frame.shape:
                 raise GridError(f"{name} is {array.shape}, the frame is {self.frame.shape}.")
             object.__setattr__(self, name, array)
-        if np.isnan(self.cost).any() or (self.cost < 1).any():
+        if not self.cost.min(initial=np.inf) >= 1:  # of what holds a NaN it is NaN
             raise ValueRangeError("a cost is below 1 or not a number.", "Give multipliers of at least 1, or inf.")
         object.__setattr__(self, "connectors", tuple(self.connectors))
         for link in self.connectors:
@@ -157,8 +157,9 @@ class NavGraph:
             raise GridError(f"a mask of shape {np.shape(free)} is no grid.", "Give (storeys, rows, cols).")
         heights = tuple(3.0 * storey for storey in range(mask.shape[0]))
         frame = GridFrame(cell_size, 0, 0, mask.shape[1], mask.shape[2], heights)
-        cost = np.where(mask, np.float32(1), np.float32(np.inf))
-        return cls(frame, cost, ~mask, np.ones_like(mask), connectivity, connectors=tuple(connectors))
+        cost = _frozen(np.where(mask, np.float32(1), np.float32(np.inf)))
+        floor = _frozen(np.ones(mask.shape, dtype=np.bool_))
+        return cls(frame, cost, _frozen(~mask), floor, connectivity, connectors=tuple(connectors))
 
     def __repr__(self) -> str:
         storeys, rows, cols = self.frame.shape
@@ -473,6 +474,8 @@ class NavGraph:
         given = np.broadcast_to(np.asarray(factor, dtype=np.float32), self.frame.shape)
         cost = _frozen(np.where(self.free, given, np.float32(np.inf)))
         graph = replace(self, cost=cost, bare_cost=None, clearances=(), changes=self.changes.with_cost(given))
+        if self.environment is None:
+            return graph
         return graph._rejoined(np.flatnonzero(self.free & ~graph.free))
 
     def with_clearance(self, metres: float, weight: float = 4.0) -> Self:

@@ -12,7 +12,7 @@ from bimnav.search.repair import Field
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import Taut, find_taut
 from bimnav.search.trace import centers
-from bimnav.search.transform import clearances, squared_clearances
+from bimnav.search.transform import by_clearance, clearances
 from bimnav.search.warmup import warmup
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Ordering",
     "Taut",
     "along",
+    "by_clearance",
     "centers",
     "clearances",
     "components",
@@ -42,7 +43,6 @@ __all__ = [
     "order_rows",
     "share_out",
     "shorten",
-    "squared_clearances",
     "trace_visits",
     "visit_table",
     "warmup",

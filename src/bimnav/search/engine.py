@@ -99,7 +99,7 @@ def distances_between(layout: Layout, cells: NDArray[np.int64], scale: float) ->
 def _costs_from(space: Workspace, layout: Layout, sources: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the cost of every padded cell from the nearest source."""
     steps = layout.steps[: layout.connectivity]
-    lengths = flood(layout.cost, layout.moves, steps, layout.links, layout.least, layout.greatest, sources)
+    lengths = flood(space, layout.cost, layout.moves, steps, layout.links, layout.least, layout.greatest, sources)
     if lengths is None:
         _astar(space, layout, sources, _NONE, 0.0)
         nodes = space.costs[: layout.moves.size]

@@ -27,8 +27,8 @@ from bimnav.search.workspace import workspace
 __all__ = ["Field", "patch", "repair"]
 
 _NONE = np.zeros(0, dtype=np.int64)
-# The share of the cells that a repair may touch before it gives up: it spends some forty times as long on a cell
-# as a field of equal costs does, and a few times as long as one of others, and giving up must cost little
+# The share of the free cells that a repair may touch before it gives up: it spends some forty times as long on a
+# cell as a field of equal costs does, and a few times as long as one of others, and giving up must cost little
 _SHARE_UNIFORM, _SHARE_WEIGHTED = 1 / 600, 1 / 150
 _WAITS, _SOURCE = 1, 2
 _UNITS = np.array([STRAIGHT] * 4 + [DIAGONAL] * 4)
@@ -53,6 +53,7 @@ class Field:
         self._cost = layout.cost.copy()
         self._moves = layout.moves.copy()
         self._sources: NDArray[np.int64] = layout.padded(np.asarray(sources, dtype=np.int64))
+        self._free = np.count_nonzero(self._moves)
         self._level = layout.least if layout.is_uniform else math.nan
         self._marks = np.zeros(self._moves.size, dtype=np.uint8)
         self._hubs = np.unique(np.concatenate(layout.links[:2]))
@@ -127,7 +128,7 @@ class Field:
             length = np.array([round(cells / self._level * STRAIGHT) for cells in length.tolist()], dtype=np.int64)
         back = self._back
         share = _SHARE_UNIFORM if self.is_uniform else _SHARE_WEIGHTED
-        room = max(64, int(share * self._moves.size))
+        room = max(64, int(share * self._free))
         lost = np.empty(room, dtype=np.int64)
         while len(space.keys) < 4 * room:
             space.grow_heap()
@@ -163,9 +164,9 @@ class Field:
         finite = self._cost[np.isfinite(self._cost)]
         if len(finite):
             bounds = float(finite.min()), float(finite.max())
-            lengths = flood(self._cost, self._moves, steps, self._links, *bounds, self._sources)
+            lengths = flood(space, self._cost, self._moves, steps, self._links, *bounds, self._sources)
             if lengths is not None:
-                self._lengths = lengths
+                self._lengths = lengths.copy()
                 return
 
         def weighted(stamp: int) -> int:
@@ -308,6 +309,8 @@ def repair(
                 if lengths[other] != far and not marks[other] & _WAITS and length + link_length[k] == lengths[other]:
                     marks[other] |= _WAITS
                     size = push(keys, items, size, lengths[other], other)
+    for k in range(min(size, len(keys) - 4)):  # a full heap has room for four more
+        marks[items[k]] = 0
     forget(keys, size, never)
     size = 0
     for k in range(count):
@@ -315,7 +318,6 @@ def repair(
     for source in sources:
         marks[source] = 0
     if outcome == FULL:
-        marks[:] = 0
         return FULL
     # the best way in from what is left, for cells that were taken back and for those whose ways changed
     for k in range(count + 9 * len(changed)):

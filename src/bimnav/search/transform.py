@@ -1,14 +1,18 @@
 # mypy: disable-error-code="assignment"
-"""How far every cell is from what blocks: the exact Euclidean distance transform."""
+"""How far every cell is from what blocks: the exact Euclidean distance transform, whole or near what blocks."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bimnav.search.compiled import lean
 
-__all__ = ["clearances", "squared_clearances", "transform"]
+__all__ = ["by_clearance", "clearances", "transform"]
+
+_WIDEST = 48  # cells; from there on the whole transform costs less than looking so far around every cell
 
 
 def clearances(free: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -24,14 +28,93 @@ def clearances(free: NDArray[np.bool_]) -> NDArray[np.float64]:
     distance : (storeys, rows, cols) float64
         0 where blocked.
     """
-    return np.sqrt(squared_clearances(free))
+    return np.sqrt(_squared(free))
 
 
-def squared_clearances(free: NDArray[np.bool_]) -> NDArray[np.int32]:
+def by_clearance(free: NDArray[np.bool_], values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return a value for every cell by the square of its distance from what blocks, as in `clearances`.
+
+    Parameters
+    ----------
+    free : (storeys, rows, cols) bool
+    values : (n,) float32
+        For squared distances 0 to n - 1, in cells; the last also for all beyond.
+    """
+    reach = math.isqrt(max(len(values) - 2, 0)) + 1  # from here on the square of a whole number lies beyond
+    if reach > _WIDEST:
+        squared = _squared(free)
+        beyond: NDArray[np.float32] = values[np.minimum(squared, len(values) - 1, out=squared)]
+        return beyond
+    found = np.empty(free.shape, dtype=np.float32)
+    heights = np.empty(free.shape[1:], dtype=np.uint16)
+    line = np.empty((2, free.shape[2] + 2 * reach), dtype=np.uint16)
+    look_up(np.ascontiguousarray(free), values, reach, heights, line, found)
+    return found
+
+
+def _squared(free: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Return the squares of `clearances`, whole numbers."""
     squared = np.empty(free.shape, dtype=np.int32)
     transform(np.ascontiguousarray(free), squared, np.empty((3, free.shape[2] + 1), dtype=np.int64))
     return squared
+
+
+@lean
+def look_up(
+    free: NDArray[np.bool_],
+    values: NDArray[np.float32],
+    reach: int,
+    heights: NDArray[np.uint16],
+    line: NDArray[np.uint16],
+    found: NDArray[np.float32],
+) -> None:
+    """Fill in `found`: `by_clearance`, of distances that are cut off at `reach` cells.
+
+    First along columns, then the least over a window in every row: many cells at a time, for all that are
+    looked at lie next to each other.
+
+    Parameters
+    ----------
+    heights : (rows, cols) uint16, scratch
+    line : (2, cols + 2 * reach) uint16, scratch
+    """
+    storeys, rows, cols = free.shape
+    most, last = np.uint16(reach), np.uint16(len(values) - 1)
+    one = np.uint16(1)
+    squares, least = line[0], line[1, :cols]
+    squares[:reach] = 0  # the rim and what lies behind it
+    squares[cols + reach :] = 0
+    middle = squares[reach : reach + cols]
+    for storey in range(storeys):
+        for row in range(rows):
+            here, is_free = heights[row], free[storey, row]
+            for col in range(cols):
+                here[col] = is_free[col]
+            if row:
+                below = heights[row - 1]
+                for col in range(cols):
+                    here[col] *= min(most, np.uint16(below[col] + one))
+        for row in range(rows - 1, -1, -1):
+            here = heights[row]
+            if row < rows - 1:
+                above = heights[row + 1]
+                for col in range(cols):
+                    here[col] = min(here[col], np.uint16(above[col] + one))
+            else:
+                for col in range(cols):
+                    here[col] = min(here[col], one)
+            for col in range(cols):
+                middle[col] = np.uint16(here[col] * here[col])
+            for col in range(cols):
+                least[col] = middle[col]
+            for away in range(1, reach):
+                added = np.uint16(away * away)
+                left, right = squares[reach - away : reach - away + cols], squares[reach + away : reach + away + cols]
+                for col in range(cols):
+                    least[col] = min(least[col], np.uint16(min(left[col], right[col]) + added))
+            into = found[storey, row]
+            for col in range(cols):
+                into[col] = values[min(least[col], last)]
 
 
 @lean

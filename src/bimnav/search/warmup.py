@@ -15,7 +15,7 @@ from bimnav.search.repair import Field
 from bimnav.search.sight import along, dearest, shorten
 from bimnav.search.taut import find_taut
 from bimnav.search.trace import centers
-from bimnav.search.transform import clearances
+from bimnav.search.transform import by_clearance, clearances
 
 __all__ = ["warmup"]
 
@@ -26,6 +26,7 @@ def warmup() -> None:
     cells = np.array([0, 8])
     components(cost > 0)
     clearances(cost > 0)
+    by_clearance(cost > 0, cost[0, 0])
     dilate(cost[0] > 0, cost[0] > 0)
     everywhere = np.ones((8, 3, 3), dtype=np.bool_)
     find_motion(everywhere, everywhere, (0, 0, 0), (-1, 2, 2), 1.0, 2.0)
