@@ -530,7 +530,7 @@ What each engine is for:
 - `engine="rustworkx"` searches the graph written out, with callables that run no Python code. It is the second
   opinion: the same costs, hundreds of times slower.
 - `to_rustworkx()` and `to_networkx()` are for algorithms that bimnav does not have.
-- `distance_field` and `distance_matrix` are for many goals at once; `search.Field` keeps a field right while doors
+- `distance_field` and `distance_matrix` are for many goals at once; `LiveField` keeps a field right while doors
   open and close.
 - `smooth="any_angle"` is exact on masks: no shorter path exists for a point between those cells where all floor
   costs the same. Around footprints it is exact but for the chords that stand for arcs, half a percent of the radius.

@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from bimnav.ifc._federate import federate as federate
     from bimnav.inspection import inspect as inspect
     from bimnav.links import Link as Link, RefusedConnector as RefusedConnector
+    from bimnav.live import LiveField as LiveField
     from bimnav.mission import Mission as Mission, run as run
     from bimnav.plan import (
         Assignment as Assignment,
@@ -160,6 +161,7 @@ _HOMES = {
     "bimnav._start": "Start find_start",
     "bimnav.ifc._federate": "federate",
     "bimnav.links": "Link RefusedConnector",
+    "bimnav.live": "LiveField",
     "bimnav.mission": "Mission run",
     "bimnav.plan": (
         "Assignment Charge Path StopOrder TeamPlan Tour assign_stops distance_field distance_matrix find_path "

@@ -43,7 +43,9 @@ __all__ = [
     "distance_matrix",
     "find_path",
     "free_index",
+    "layout_of",
     "smooth_path",
+    "source_indexes",
 ]
 
 Algorithm = Literal["auto", "astar", "dijkstra"]
@@ -180,7 +182,7 @@ def find_path(
     if engine == "rustworkx":
         path = _find_explicit(graph, begin, end, algorithm)
     else:
-        found = search.find(_layout(graph), begin, end, algorithm)
+        found = search.find(layout_of(graph), begin, end, algorithm)
         if found is None:
             raise _no_path(graph, begin, end)
         d = graph.frame.cell_size
@@ -266,11 +268,16 @@ def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[n
     OutsideMapError, StartBlockedError
         If a source lies outside the map or is blocked.
     """
+    index = source_indexes(graph, sources)
+    return search.distances(layout_of(graph), index, graph.frame.cell_size * graph.unit_cost)
+
+
+def source_indexes(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[np.int64]:
+    """Return the flat indexes of free cells, at least one."""
     cells = [sources] if isinstance(sources, Cell) else list(sources)
     if not cells:
         raise InputError("a distance field needs a source.", "Give at least one free cell.")
-    index = np.array([free_index(graph, cell, "start") for cell in cells])
-    return search.distances(_layout(graph), index, graph.frame.cell_size * graph.unit_cost)
+    return np.array([free_index(graph, cell, "start") for cell in cells])
 
 
 def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float64]:
@@ -298,11 +305,12 @@ def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float6
     np.fill_diagonal(matrix, 0.0)
     free = np.flatnonzero(np.isfinite(graph.cost.ravel()[index]))
     scale = graph.frame.cell_size * graph.unit_cost
-    matrix[np.ix_(free, free)] = search.distances_between(_layout(graph), index[free], scale)
+    matrix[np.ix_(free, free)] = search.distances_between(layout_of(graph), index[free], scale)
     return matrix
 
 
-def _layout(graph: NavGraph) -> search.Layout:
+def layout_of(graph: NavGraph) -> search.Layout:
+    """Return the arrays that the kernels want of a graph, the same ones every time."""
     layout = _layouts.get(graph)
     if layout is None:
         links, costs = graph.links
@@ -380,7 +388,7 @@ def _find_explicit(graph: NavGraph, begin: int, end: int, algorithm: Algorithm) 
     """Search the graph written out, with callables that run no Python code."""
     import rustworkx
 
-    layout = _layout(graph)
+    layout = layout_of(graph)
     if algorithm == "dijkstra":
         to_go = (0.0).__mul__
     else:
