@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from bimnav._toml import read_toml
 from bimnav.building import Building, Classification, Element, Facts, Mesh, Shape, Space, Storey
 from bimnav.environment import make_environment
 from bimnav.errors import (
@@ -24,7 +25,6 @@ from bimnav.errors import (
 from bimnav.tasks import Rule, Standoff, Task, choose, list_tasks, load_task, match, task_schema
 from bimnav.tasks._conditions import parse_condition
 from bimnav.tasks._lint import lint_filters
-from bimnav.tasks._toml import read_toml
 from tests.conftest import real_model
 
 # what a robot that cleans is to find: names as exporters write them

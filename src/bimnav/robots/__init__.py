@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-import difflib
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
-from bimnav.errors import FileKindError, FileMissingError, FileTooLargeError, InputError, RobotError, ValueRangeError
+from bimnav._table_files import Folders, TableFiles, is_path, parted
+from bimnav._toml import Problem, Toml, read_toml
+from bimnav._wording import meant, nearest
+from bimnav.errors import RobotError, ValueRangeError
 from bimnav.robot import Robot
 from bimnav.robots._schema import robot_schema
-from bimnav.tasks._toml import Problem, Toml, read_toml
 
 __all__ = ["VARIABLE", "RobotInfo", "list_robots", "load_robot", "robot_named", "robot_schema"]
 
 VARIABLE = "BIMNAV_ROBOTS"
 """The environment variable that holds users' own folders and files of robots."""
 
-_LARGEST = 1_000_000  # bytes; the built-in profiles are a hundredth of it
-_MOST = 50  # mistakes, or names, told in one message
+_FILES = TableFiles("robot", VARIABLE, RobotError)
 _LIKE = {f.name: f.default for f in fields(Robot) if f.default is not MISSING and f.name != "name"}
 _NUMBER, _FLAG, _WORDS, _CORNERS = (
     "a number",
@@ -32,8 +32,6 @@ _NUMBER, _FLAG, _WORDS, _CORNERS = (
     "a list of texts",
     "a list of corners [x, y] in metres",
 )
-
-Folders: TypeAlias = Iterable[str | PathLike[str]]
 
 
 class RobotInfo(NamedTuple):
@@ -97,13 +95,12 @@ def load_robot(robot: str | PathLike[str], name: str | None = None, *, robots_pa
     """
     text = os.fspath(robot)
     if isinstance(robot, str):
-        before, parted, behind = text.rpartition(".toml#")
-        if parted and name is None:
-            text, name = f"{before}.toml", behind
-        if not text.endswith(".toml") and "/" not in text and "\\" not in text:
+        if name is None:
+            text, name = parted(text, "#")
+        if not is_path(text):
             return _of(_known(robots_path), text, "the list of robots").robot
     path = Path(text)
-    profiles = _profiles([(_text_of(path), str(path))], _known(robots_path))
+    profiles = _profiles([(_FILES.text_of(path), str(path))], _known(robots_path))
     if name is None and len(profiles) > 1:
         raise RobotError(
             f"{path} holds {len(profiles)} robots.",
@@ -122,10 +119,10 @@ def robot_named(robot: str, *, robots_path: Folders = ()) -> Robot:
 
 def _of(profiles: Mapping[str, _Profile], name: str, where: str) -> _Profile:
     if name not in profiles:
-        near = difflib.get_close_matches(name, profiles, 1)
-        told = f"Did you mean {near[0]!r}? " if near else ""
-        hint = f"{told}Known are {', '.join(list(profiles)[:_MOST])}."
-        raise RobotError(f"there is no robot {name!r} in {where}.", hint, {"name": name, "known": list(profiles)})
+        known = list(profiles)
+        raise RobotError(
+            f"there is no robot {name!r} in {where}.", nearest(name, known), {"name": name, "known": known}
+        )
     return profiles[name]
 
 
@@ -136,40 +133,8 @@ def _library() -> Mapping[str, _Profile]:
 
 
 def _known(robots_path: Folders) -> Mapping[str, _Profile]:
-    wanted = [Path(entry) for entry in robots_path]
-    wanted += [Path(entry) for entry in os.environ.get(VARIABLE, "").split(os.pathsep) if entry]
-    paths = dict.fromkeys(path for entry in wanted for path in _files_at(entry))
-    own = _profiles([(_text_of(path), str(path)) for path in paths], _library(), is_taken=True)
+    own = _profiles(_FILES.texts(robots_path), _library(), is_taken=True)
     return {**_library(), **own}
-
-
-def _files_at(entry: Path) -> list[Path]:
-    if entry.is_file():
-        return [entry]
-    if not entry.is_dir():
-        hint = f"robots_path and {VARIABLE} list folders of robot files."
-        raise FileMissingError(f"{entry} does not exist.", hint, {"path": str(entry)})
-    return sorted(entry.glob("*.toml"))
-
-
-def _text_of(path: Path) -> str:
-    context = {"path": str(path)}
-    if not path.exists():
-        raise FileMissingError(f"{path} does not exist.", "Check the path of the robot file.", context)
-    if not path.is_file():
-        raise FileKindError(f"{path} is not a file.", "Give a TOML file of robots.", context)
-    try:
-        with path.open("rb") as file:
-            data = file.read(_LARGEST + 1)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.", "Check path and permissions.", context) from error
-    if len(data) > _LARGEST:
-        raise FileTooLargeError(f"{path} has more than {_LARGEST} bytes.", "Robot files are small texts.", context)
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise RobotError(f"{path}:{line}: this is not UTF-8 text.", "Save the file as UTF-8.", context) from error
 
 
 def _profiles(
@@ -187,11 +152,7 @@ def _profiles(
     reader = _Reader([(source, read_toml(text)) for text, source in texts], outside, is_taken)
     found = reader.read()
     if reader.problems:
-        ordered = sorted(reader.problems, key=lambda each: (each[0], each[1].line))
-        lines = [f"{source}:{problem.line}: {problem.message}" for source, problem in ordered[:_MOST]]
-        more = f"There are {len(ordered) - _MOST} more mistakes." if len(ordered) > _MOST else ""
-        told = [{"file": source, **asdict(problem)} for source, problem in ordered]
-        raise RobotError("\n".join(lines), more, {"file": ordered[0][0], "problems": told})
+        raise _FILES.mistakes(reader.problems)
     return found
 
 
@@ -253,9 +214,7 @@ class _Reader:
         for field, value in table.items():
             key = ("robots", name, field)
             if field not in known:
-                near = difflib.get_close_matches(field, known, 1)
-                hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}."
-                self._refuse(source, toml, key, f"unknown key {field!r} in robots.{name}; {hint}", value)
+                self._refuse(source, toml, key, f"unknown key {field!r} in robots.{name}; {meant(field, known)}", value)
             elif field in ("description", "extends"):
                 if not isinstance(value, str):
                     self._refuse(source, toml, key, f"robots.{name}.{field} = {value!r}: should be a text.", value)
@@ -289,9 +248,8 @@ class _Reader:
             return self._values.get(base) if self._make(base, pending) else None
         if base not in self._outside:
             known = [*(other for other in self._places if other != name), *self._outside]
-            near = difflib.get_close_matches(base, known, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}."
-            self._refuse(source, toml, key, f"robots.{name}.extends = {base!r}: there is no such robot; {hint}", base)
+            told = f"robots.{name}.extends = {base!r}: there is no such robot; {meant(base, known)}"
+            self._refuse(source, toml, key, told, base)
             return None
         return dict(_said(self._outside[base].robot))
 

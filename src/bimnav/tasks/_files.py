@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import logging
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from os import PathLike
@@ -14,9 +12,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from bimnav.errors import FileKindError, FileMissingError, FileTooLargeError, InputError, TaskError
+from bimnav._table_files import Folders, TableFiles, is_path, parted
+from bimnav._toml import Problem, Toml, read_toml
+from bimnav._wording import nearest
+from bimnav.errors import TaskError
 from bimnav.tasks._task import RULE_LISTS, Rule, Standoff, Task
-from bimnav.tasks._toml import Problem, Toml, read_toml
 
 if TYPE_CHECKING:
     from bimnav.tasks._schema import RuleTable, TaskTable
@@ -28,10 +28,8 @@ _LOG = logging.getLogger(__name__)
 VARIABLE = "BIMNAV_TASKS"
 """The environment variable that holds users' own folders and files of tasks."""
 
-_LARGEST = 1_000_000  # bytes; the built-in library is a hundredth of it
-_MOST = 50  # mistakes, or names, told in one message
+_FILES = TableFiles("task", VARIABLE, TaskError)
 
-Folders: TypeAlias = Iterable[str | PathLike[str]]
 Known: TypeAlias = Callable[[], Mapping[str, Task]]
 
 
@@ -113,13 +111,12 @@ def load_task(task: str | Path, name: str | None = None, *, tasks_path: Folders 
         If the file cannot be read at all.
     """
     if isinstance(task, str):
-        before, parted, behind = task.rpartition(".toml:")
-        if parted and name is None:
-            task, name = f"{before}.toml", behind
-        if not task.endswith(".toml") and "/" not in task and "\\" not in task:
+        if name is None:
+            task, name = parted(task, ":")
+        if not is_path(task):
             return _named(task, name, _library() if task in _library() else _known(tasks_path))
     path = Path(task)
-    tasks = _tasks([_read(_text_of(path), str(path))], lambda: _known(tasks_path))
+    tasks = _tasks([_read(_FILES.text_of(path), str(path))], lambda: _known(tasks_path))
     return _chosen(tasks, name, str(path))
 
 
@@ -131,7 +128,7 @@ def check_file(path: str | PathLike[str], *, tasks_path: Folders = ()) -> FileCh
     FileMissingError, FileKindError, FileTooLargeError
         If the file cannot be read at all.
     """
-    file = _read(_text_of(Path(path)), str(path))
+    file = _read(_FILES.text_of(Path(path)), str(path))
     tasks, problems = _resolved([file], lambda: _known(tasks_path), {})
     found = tuple(problem for _, problem in problems)
     return FileCheck({} if found else tasks, found, file.warnings)
@@ -166,21 +163,8 @@ def _library() -> Mapping[str, Task]:
 
 def _known(tasks_path: Folders) -> Mapping[str, Task]:
     """Return the built-in tasks and those of users' own folders."""
-    wanted = [Path(entry) for entry in tasks_path]
-    wanted += [Path(entry) for entry in os.environ.get(VARIABLE, "").split(os.pathsep) if entry]
-    paths = list(dict.fromkeys(path for entry in wanted for path in _files_at(entry)))
-    read = [_read(_text_of(path), str(path)) for path in paths]
+    read = [_read(text, source) for text, source in _FILES.texts(tasks_path)]
     return _sorted({**_library(), **_tasks(read, _library, _library())})
-
-
-def _files_at(entry: Path) -> list[Path]:
-    if entry.is_file():
-        return [entry]
-    if not entry.is_dir():
-        raise FileMissingError(
-            f"{entry} does not exist.", f"tasks_path and {VARIABLE} list folders of task files.", {"path": str(entry)}
-        )
-    return sorted(entry.glob("*.toml"))
 
 
 def _sorted(tasks: Mapping[str, Task]) -> Mapping[str, Task]:
@@ -192,7 +176,7 @@ def _named(task: str, name: str | None, known: Mapping[str, Task]) -> Task:
         told = task if name is None else f"{task}:{name}"
         raise TaskError(
             f"there is no task {told!r}.",
-            f"{_nearest(task, known)} For a task of your own give the path of a .toml file.",
+            f"{nearest(task, known)} For a task of your own give the path of a .toml file.",
             {"name": task, "known": list(known)},
         )
     return known[task]
@@ -204,41 +188,12 @@ def _chosen(tasks: Mapping[str, Task], name: str | None, source: str) -> Task:
     if name is None:
         raise TaskError(
             f"{source} holds {len(tasks)} tasks.",
-            f"{_nearest('', tasks)} Say which, as in {source}:{next(iter(tasks))}.",
+            f"{nearest('', tasks)} Say which, as in {source}:{next(iter(tasks))}.",
             {"known": list(tasks)},
         )
     if name not in tasks:
-        raise TaskError(f"{source} has no task {name!r}.", _nearest(name, tasks), {"name": name, "known": list(tasks)})
+        raise TaskError(f"{source} has no task {name!r}.", nearest(name, tasks), {"name": name, "known": list(tasks)})
     return tasks[name]
-
-
-def _nearest(name: str, known: Iterable[str]) -> str:
-    known = list(known)
-    near = difflib.get_close_matches(name, known, 1)
-    listed = f"Known are {', '.join(known[:_MOST])}{', ...' if len(known) > _MOST else '.'}"
-    return f"Did you mean {near[0]!r}? {listed}" if near else listed
-
-
-def _text_of(path: Path) -> str:
-    context = {"path": str(path)}
-    try:
-        if not path.exists():
-            raise FileMissingError(f"{path} does not exist.", "Check the path of the task file.", context)
-        if not path.is_file():
-            raise FileKindError(f"{path} is not a file.", "Give a TOML file of tasks.", context)
-        with path.open("rb") as file:
-            data = file.read(_LARGEST + 1)
-    except OSError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path} cannot be read: {error.strerror}.", "Check path and permissions.", context) from error
-    if len(data) > _LARGEST:
-        raise FileTooLargeError(f"{path} has more than {_LARGEST} bytes.", "Task files are small texts.", context)
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise TaskError(f"{path}:{line}: this is not UTF-8 text.", "Save the file as UTF-8.", context) from error
 
 
 def _read(text: str, source: str, *, is_linted: bool = False) -> _File:
@@ -263,7 +218,7 @@ def _tasks(read: Iterable[_File], outside: Known, taken: Mapping[str, Task] = Ma
     read = list(read)
     tasks, problems = _resolved(read, outside, taken)
     if problems:
-        raise _mistakes(problems)
+        raise _FILES.mistakes(problems)
     for file in read:
         for warning in file.warnings:
             _LOG.warning("%s:%d: %s", file.source, warning.line, warning.message)
@@ -340,7 +295,7 @@ class _Resolver:
             return self.task(base)
         known = {other: task for other, task in self._outside().items() if task.source != _place(file, name)}
         if base not in known:
-            self._refuse(file, key, base, f"there is no such task. {_nearest(base, [*self._places, *known])}")
+            self._refuse(file, key, base, f"there is no such task. {nearest(base, [*self._places, *known])}")
         return known.get(base)
 
     def _refuse(self, file: _File, key: tuple[str, ...], value: str, what: str) -> None:
@@ -377,11 +332,3 @@ def _values(table: TaskTable | RuleTable, *, said: bool = False) -> dict[str, An
     if isinstance(values.get("destination"), dict):
         values["destination"] = Standoff(**values["destination"])
     return values
-
-
-def _mistakes(problems: Iterable[tuple[str, Problem]]) -> TaskError:
-    problems = sorted(problems, key=lambda each: (each[0], each[1].line))
-    lines = [f"{source}:{problem.line}: {problem.message}" for source, problem in problems[:_MOST]]
-    more = f"There are {len(problems) - _MOST} more mistakes." if len(problems) > _MOST else ""
-    context = {"file": problems[0][0], "problems": [{"file": s, **asdict(problem)} for s, problem in problems]}
-    return TaskError("\n".join(lines), more, context)

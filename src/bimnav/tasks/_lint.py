@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from bimnav._toml import Key, Problem, Toml
 from bimnav.building import Building, Issue
 from bimnav.tasks._match import told
 from bimnav.tasks._task import RULE_LISTS, Rule, Task
-from bimnav.tasks._toml import Key, Problem, Toml
 
 if TYPE_CHECKING:
     from bimnav.ifc._lint import Finding

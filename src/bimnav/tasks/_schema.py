@@ -18,6 +18,8 @@ from pydantic import (
     ValidationError,
 )
 
+from bimnav._toml import Key, Problem, Toml
+from bimnav._wording import meant
 from bimnav.tasks._task import (
     EXPECT,
     RULE_LISTS,
@@ -29,7 +31,6 @@ from bimnav.tasks._task import (
     checked_conditions,
     checked_words,
 )
-from bimnav.tasks._toml import Key, Problem, Toml
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -222,9 +223,7 @@ def _explained(detail: ErrorDetails, key: Key) -> str:
         return f"{last!r} is missing in {table}{'; begin with schema = 1.' if last == 'schema' else '.'}"
     if kind == "extra_forbidden":
         known = [field.alias or name for name, field in _layout(key).model_fields.items()]
-        near = difflib.get_close_matches(last, known, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}."
-        return f"unknown key {last!r} in {table}; {hint}"
+        return f"unknown key {last!r} in {table}; {meant(last, known)}"
     wanted = {
         "dict_type": "should be a table",
         "list_type": f"should be a list: [[{_dotted(key)}]]" if last in RULE_LISTS else "should be a list",
