@@ -487,6 +487,11 @@ READER = """
 """
 
 
+def listen() -> None:
+    """Take signals as a program in the foreground does; a shell tells those in the background to ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def stalled_reader(path: Path) -> subprocess.Popen[str]:
     """Start a program that reads a file, and wait until the reader stalls."""
     process = subprocess.Popen(
@@ -494,6 +499,7 @@ def stalled_reader(path: Path) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=listen,
     )
     assert process.stdout is not None
     for line in process.stdout:
@@ -523,7 +529,8 @@ def test_ctrl_c_ends_the_process_and_leaves_nothing(tmp_path: Path, monkeypatch:
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_ctrl_c_on_the_command_line_is_one_line_and_an_exit_code(tmp_path: Path):
     path = written(tmp_path, staller(500))
-    process = subprocess.Popen([sys.executable, "-m", "bimnav.cli", "inspect", str(path)], stderr=subprocess.PIPE)
+    command = [sys.executable, "-m", "bimnav.cli", "inspect", str(path)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, preexec_fn=listen)
     assert until(lambda: len(processes_about(str(path))) == 2)
     process.send_signal(signal.SIGINT)
     _, stderr = process.communicate(timeout=20)
