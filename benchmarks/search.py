@@ -395,7 +395,9 @@ def memory(_: int, tiny: bool) -> Row:
 # numba imports its typed containers and scipy.linalg at the first call of any kernel
 FIRST = """
 import time, json
-begin = time.process_time(); import numba, numba.typed, scipy.linalg, scipy.ndimage, shapely; imported = time.process_time() - begin
+begin = time.process_time()
+import numba, numba.typed, scipy.linalg, scipy.ndimage, shapely
+imported = time.process_time() - begin
 begin = time.process_time(); import numpy as np, bimnav as bn
 graph = bn.NavGraph.from_mask(np.ones((64, 64), dtype=bool)); bn.find_path(graph, bn.Cell(0, 0, 0), bn.Cell(0, 63, 63))
 first = time.process_time() - begin
