@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from bimnav import _checks
 from bimnav.errors import OutputError
 
 __all__ = ["write_bytes", "write_text"]
@@ -59,7 +60,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes | memoryview) -> Path:
         If the path names a folder, a link, a pipe or a device, or the file cannot be written; what stood
         there before is unchanged and no temporary file stays behind.
     """
-    path = Path(path)
+    path = _checks.path("path", path)
     try:
         mode = _mode_of(path)
         _remove_stale(path.parent)

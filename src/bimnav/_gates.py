@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav._doorways import Doorway, doorway_of
 from bimnav._levels import FLUSH, ROUNDING
 from bimnav.building import Door
@@ -90,6 +91,8 @@ def doors_of(
     checks
         One for every door, in the building's order.
     """
+    _checks.need("environment", environment, IndoorEnvironment)
+    _checks.need("graph", graph, NavGraph, or_none=True)
     if graph is None and any(not environment.floor(k).is_empty for k in range(len(environment.levels))):
         graph = build_graph(environment, cell_size=cell_size)
     gates = Gates(environment, graph)

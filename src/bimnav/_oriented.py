@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bimnav import search
+from bimnav import _checks, search
 from bimnav.errors import (
     GoalBlockedError,
     InputError,
@@ -104,10 +104,11 @@ def find_poses(
     NoPathError
         If no motion joins the two.
     """
+    _checks.need("graph", graph, "NavGraph")
     environment = graph.environment
     if environment is None:
         raise InputError("a graph from a mask knows no robot.", "Make it from an environment.")
-    if not (turn_cost > 0 and reverse >= 1):
+    if not (_checks.number("turn_cost", turn_cost) > 0 and _checks.number("reverse", reverse) >= 1):
         raise ValueRangeError(f"turn_cost is {turn_cost}, reverse is {reverse}.", "Give more than 0, and at least 1.")
     storeys = [environment.storeys_at(place)[0] for place in (start, goal)]
     if storeys[0] != storeys[1]:

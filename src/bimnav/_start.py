@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import shapely
 
+from bimnav import _checks
 from bimnav.building import Element, Space
 from bimnav.environment import IndoorEnvironment, Place, Region
 from bimnav.errors import GoalBlockedError, NothingWalkableError, OutsideMapError, StartBlockedError
@@ -47,6 +48,7 @@ def find_start(graph: NavGraph, place: Place | None = None) -> Start:
     StartBlockedError
         If the robot would touch an obstacle there; the message names it and a free point near by.
     """
+    _checks.need("graph", graph, NavGraph)
     environment = _environment_of(graph)
     if not graph.free.any():
         raise NothingWalkableError(

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import itertools
 import json
+import logging
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -17,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
+from bimnav import _checks
 from bimnav._files import write_text
 from bimnav._progress import Display, Progress
 from bimnav.environment import IndoorEnvironment, Place
@@ -31,6 +34,8 @@ if TYPE_CHECKING:
     import pandas
 
 __all__ = ["Study", "study"]
+
+_LOG = logging.getLogger(__name__)
 
 Row: TypeAlias = dict[str, Any]
 Backend: TypeAlias = Literal["serial", "threads", "processes", "dask"]
@@ -77,8 +82,17 @@ class Study:
         return len(self.rows)
 
     def __repr__(self) -> str:
-        failed = sum(bool(row["error"]) for row in self.rows)
-        return f"Study({len(self)} scenarios, {failed} not played)"
+        errors = Counter(row["error"] for row in self.rows if row["error"])
+        if self.is_in_vain:
+            why, count = errors.most_common(1)[0]
+            most = f"{count} times, " if count < len(self) else ""
+            return f"Study(none of {len(self)} scenarios could be played: {most}{why})"
+        return f"Study({len(self)} scenarios, {errors.total()} not played)"
+
+    @property
+    def is_in_vain(self) -> bool:
+        """Whether not one scenario could be played."""
+        return bool(self.rows) and all(row["error"] for row in self.rows)
 
     def _repr_html_(self) -> str:
         """Return a card for a notebook."""
@@ -118,7 +132,12 @@ class Study:
         """
         from scipy import stats
 
-        if result not in _RESULTS[:-1] or not set(by) <= set(_SETTINGS) or not 0 < confidence < 1:
+        by = _checks.many("by", by, str)
+        if (
+            result not in _RESULTS[:-1]
+            or not set(by) <= set(_SETTINGS)
+            or not 0 < _checks.number("confidence", confidence) < 1
+        ):
             raise ValueRangeError(
                 f"no summary of {result!r} by {tuple(by)} at {confidence}.",
                 f"Results are {', '.join(_RESULTS[:-1])}; settings are {', '.join(_SETTINGS)}; 0 < confidence < 1.",
@@ -142,7 +161,7 @@ class Study:
         """Write the rows as comma-separated values; see `EventLog.to_csv`."""
         text = csv_text(self.columns, ([row[name] for name in self.columns] for row in self.rows))
         if path is not None:
-            write_text(Path(path), text)
+            write_text(path, text)
         return text
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -224,7 +243,7 @@ def study(
     Returns
     -------
     study
-        One row for every scenario, the same for every backend.
+        One row for every scenario, the same for every backend. That none could be played is logged as a warning.
 
     Raises
     ------
@@ -233,29 +252,38 @@ def study(
     MissingExtraError
         If dask is not installed.
     """
-    if backend not in ("serial", *_JOBLIB) or workers < 1:
+    _checks.need("environment", environment, IndoorEnvironment)
+    _checks.need("options", options, Mapping, or_none=True)
+    _checks.whole("workers", workers, 1)
+    if connectivity not in (4, 8):
+        raise ValueRangeError(f"connectivity is {connectivity!r:.80}.", "Give 4 or 8.")
+    if backend not in ("serial", *_JOBLIB):
         known = ", ".join(map(repr, ("serial", *_JOBLIB)))
-        raise ValueRangeError(f"backend is {backend!r} with {workers} workers.", f"Give one of {known}, at least 1.")
+        raise ValueRangeError(f"backend is {backend!r}.", f"Give one of {known}.")
+    own = [environment.robot.speed]
     lists: dict[str, list[Any]] = {
-        "start": [tuple(start) for start in starts],
-        "cell_size": [float(size) for size in cell_sizes],
-        "robots": [int(count) for count in robots],
-        "speed": [float(speed) for speed in ([environment.robot.speed] if speeds is None else speeds)],
-        "closed_doors": [tuple(doors) for doors in closed_doors],
-        "seed": [int(seed) for seed in seeds],
+        "start": [_checks.many("a start", start) for start in _checks.many("starts", starts)],
+        "cell_size": [_checks.number("a cell size", size) for size in _checks.many("cell_sizes", cell_sizes)],
+        "robots": [_checks.whole("a number of robots", count, 1) for count in _checks.many("robots", robots)],
+        "speed": [
+            _checks.number("a speed", speed) for speed in _checks.many("speeds", own if speeds is None else speeds)
+        ],
+        "closed_doors": [
+            _checks.many("a set of doors", doors, str) for doors in _checks.many("closed_doors", closed_doors)
+        ],
+        "seed": [_checks.whole("a seed", seed, 0) for seed in _checks.many("seeds", seeds)],
     }
     empty = [name for name, values in lists.items() if not values]
     if empty:
         raise InputError(f"there is no {', no '.join(empty)} to try.", "Give at least one of each setting.")
-    if min(lists["robots"]) < 1:
-        raise ValueRangeError(f"{min(lists['robots'])} robots do nothing.", "Give at least one.")
     grid = [
         dict(zip(lists, combination, strict=True)) | {"closed_doors": " ".join(combination[4])}
         for combination in itertools.product(*lists.values())
     ]
     for row in grid:
         row["start"] = " ".join(str(value) for value in row["start"])
-    done = {} if file is None else _kept(Path(file))
+    file = None if file is None else _checks.path("file", file)
+    done = {} if file is None else _kept(file)
     places = {" ".join(str(value) for value in start): start for start in lists["start"]}
     doors = {" ".join(names): names for names in lists["closed_doors"]}
     missing = [row for row in grid if _key(row) not in done]
@@ -268,9 +296,12 @@ def study(
             done |= {_key(row): row for row in jobs if isinstance(row, dict)}
             if file is not None:
                 lines = [json.dumps(done[_key(row)], allow_nan=False) for row in grid if _key(row) in done]
-                write_text(Path(file), "".join(f"{line}\n" for line in lines))
+                write_text(file, "".join(f"{line}\n" for line in lines))
             report(len(done), len(grid), "scenarios")
-    return Study(tuple(done[_key(row)] for row in grid))
+    found = Study(tuple(done[_key(row)] for row in grid))
+    if found.is_in_vain:
+        _LOG.warning("%r", found)
+    return found
 
 
 def _key(row: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from bimnav import _checks
 from bimnav._why import FIXED
 from bimnav.errors import NothingWalkableError
 
@@ -173,6 +174,7 @@ def topology(graph: NavGraph) -> Topology:
     NothingWalkableError
         If the graph was made from a mask.
     """
+    _checks.need("graph", graph, "NavGraph")
     environment = graph.environment
     if environment is None:
         raise NothingWalkableError("the graph was made from a mask; it has no rooms and doors.")

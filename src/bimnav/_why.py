@@ -14,8 +14,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bimnav import search
+from bimnav import _checks, search
 from bimnav._changes import cells_under
+from bimnav.errors import OutsideMapError
 from bimnav.graph import NavGraph, build_graph
 from bimnav.grid import Cell
 
@@ -102,6 +103,10 @@ def why_unreachable(graph: NavGraph, start: Cell, goal: Cell) -> NoRoute | None:
     why
         None if a route leads there.
     """
+    _checks.need("graph", graph, NavGraph)
+    for role, cell in (("start", start), ("goal", goal)):
+        if Cell(*_checks.cell(role, cell)) not in graph.frame:
+            raise OutsideMapError(f"{role} {cell} lies outside the map.", "`graph.frame.cell_at` finds cells.")
     if graph.components[start] == graph.components[goal] and graph.free[start]:
         return None
     found = _cheapest(graph, start, goal) if graph.cost.size <= _MOST_CELLS else None

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bimnav.errors import GoalBlockedError, NoPathError, OutsideMapError, StartBlockedError, ValueRangeError
+from bimnav import _checks
+from bimnav.errors import GoalBlockedError, NoPathError, OutsideMapError, StartBlockedError
 from bimnav.grid import Cell
 from bimnav.smooth import shorten_points
 
@@ -105,6 +106,7 @@ class AdaptiveGraph:
         """
         import rustworkx
 
+        start, goal = Cell(*_checks.cell("start", start)), Cell(*_checks.cell("goal", goal))
         begin, end = self._square_at(start, StartBlockedError), self._square_at(goal, GoalBlockedError)
         plan = np.hypot(*(self.centers[:, :2] - self.centers[end, :2]).T)
         if self.graph.connectors:  # a ride may be shorter than its plan
@@ -150,8 +152,8 @@ def adaptive_graph(graph: NavGraph, *, largest: int = 32) -> AdaptiveGraph:
     largest
         The largest edge of a square, in cells; rounded down to a power of two.
     """
-    if largest < 1:
-        raise ValueRangeError(f"largest is {largest}.", "Give at least one cell.")
+    _checks.need("graph", graph, "NavGraph")
+    _checks.whole("largest", largest, 1)
     squares, sizes, corners = _joined(graph, int(math.log2(largest)))
     frame, cost = graph.frame, graph.cost
     pairs = _neighbors(squares)

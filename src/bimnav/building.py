@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bimnav import _checks
 from bimnav.errors import GeometryError, ModelError, ValueRangeError
 
 if TYPE_CHECKING:
@@ -420,6 +421,7 @@ class Detection:
                 f"target {self.name!r:.80} at ({self.x!r:.40}, {self.y!r:.40}) cannot be read.",
                 "Give a name in UTF-8, then x and y in metres.",
             ) from error
+        _checks.fields(self, numbers="z")
         numbers = {"x": self.x, "y": self.y}
         if self.z is not None:
             numbers["z"] = self.z
@@ -430,8 +432,9 @@ class Detection:
                     "Give world coordinates of the model in metres.",
                     {"name": self.name, what: value},
                 )
-        if self.size is not None and not all(math.isfinite(s) and 0 <= s <= 1e3 for s in self.size):
-            raise ValueRangeError(f"target {self.name!r}: size is {self.size}.", "Give metres from 0 to 1000.")
+        size = np.zeros(2) if self.size is None else _checks.numbers("size", self.size)
+        if size.shape != (2,) or not ((size >= 0) & (size <= 1e3)).all():
+            raise ValueRangeError(f"target {self.name!r}: size is {self.size}.", "Give two lengths from 0 to 1000 m.")
 
     @property
     def global_id(self) -> str:
@@ -562,6 +565,8 @@ class Building:
     facts_reader: Callable[[str], Facts] | None = None
 
     def __post_init__(self) -> None:
+        for name, kind in (("storeys", Storey), ("spaces", Space), ("elements", Element), ("doors", Door)):
+            object.__setattr__(self, name, _checks.many(name, getattr(self, name), kind))
         if not self.storeys:
             raise ModelError(f"building {self.name!r} has no storey.", "Give at least one Storey.")
         heights = [storey.elevation for storey in self.storeys]
@@ -606,21 +611,22 @@ class Building:
     def __getitem__(self, global_id: str) -> Element:
         try:
             return self._by_id[global_id]
-        except KeyError:
+        except (KeyError, TypeError):  # unknown, or without a hash
             raise ModelError(
-                f"no element of {self.name!r} has the GlobalId {global_id!r}.",
+                f"no element of {self.name!r} has the GlobalId {global_id!r:.80}.",
                 "building.elements lists them all.",
                 {"global_id": global_id},
             ) from None
 
     def __contains__(self, global_id: object) -> bool:
-        return global_id in self._by_id
+        return isinstance(global_id, str) and global_id in self._by_id
 
     def __iter__(self) -> Iterator[Element]:
         return iter(self.elements)
 
     def select(self, query: str) -> tuple[Element | Space, ...]:
         """Return what a query in IfcOpenShell's selector language picks, in model order."""
+        _checks.need("query", query, str)
         chosen = set((self.selector or self._select_by_hand)(query))
         products: tuple[Element | Space, ...] = (*self.elements, *self.spaces)
         return tuple(product for product in products if product.global_id in chosen)
@@ -699,7 +705,7 @@ class Building:
         3.0
         """
         added = []
-        for target in targets:
+        for target in _checks.many("targets", targets):
             try:
                 if isinstance(target, Mapping):
                     target = Detection(**target)

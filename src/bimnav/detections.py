@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bimnav import _checks
 from bimnav.building import Detection
 from bimnav.errors import FileKindError, FileMissingError, InputError
 
@@ -75,7 +76,7 @@ def read_targets(path: str | Path) -> tuple[Detection, ...]:
     InputError
         If an entry cannot be understood; the message names file, entry and column.
     """
-    path = Path(path)
+    path = _checks.path("path", path)
     if not path.exists():
         raise FileMissingError(f"{path} does not exist.", "Check the path of the targets file.", {"path": str(path)})
     if not path.is_file():

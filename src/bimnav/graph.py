@@ -13,15 +13,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, get_args, overload
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from bimnav import search
+from bimnav import _checks, search
 from bimnav._approach import stop_for
 from bimnav._changes import Changes, Placed, cells_under, changed_arrays, indexes_of
 from bimnav._cut import FINEST, Conflict, conflict_at, cut, zone_factor
 from bimnav._explicit import Edges, networkx_of, rustworkx_of
 from bimnav.building import global_id_of
-from bimnav.environment import Obstacle, grown
+from bimnav.environment import IndoorEnvironment, Obstacle, grown
 from bimnav.errors import GeometryError, GridError, ModelError, ValueRangeError
 from bimnav.grid import Cell, GridFrame
 from bimnav.links import Link, RefusedConnector, is_near_connector, join_connectors
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
     from bimnav._explain import CellExplanation
     from bimnav.adaptive import AdaptiveGraph
-    from bimnav.environment import IndoorEnvironment, Target
+    from bimnav.environment import Target
 
 __all__ = ["Conflict", "NavGraph", "NodeKind", "Objective", "Stop", "Unreached", "build_graph"]
 
@@ -159,7 +160,9 @@ class NavGraph:
         frame = GridFrame(cell_size, 0, 0, mask.shape[1], mask.shape[2], heights)
         cost = _frozen(np.where(mask, np.float32(1), np.float32(np.inf)))
         floor = _frozen(np.ones(mask.shape, dtype=np.bool_))
-        return cls(frame, cost, _frozen(~mask), floor, connectivity, connectors=tuple(connectors))
+        return cls(
+            frame, cost, _frozen(~mask), floor, connectivity, connectors=_checks.many("connectors", connectors, Link)
+        )
 
     def __repr__(self) -> str:
         storeys, rows, cols = self.frame.shape
@@ -268,7 +271,7 @@ class NavGraph:
 
     def link_between(self, begin: Cell, end: Cell) -> Link | None:
         """Return the cheapest connector that joins two cells; None if none does."""
-        return self._links_by_ends.get((*begin, *end))
+        return self._links_by_ends.get((*_checks.cell("begin", begin), *_checks.cell("end", end)))
 
     @cached_property
     def _links_by_ends(self) -> dict[tuple[int, ...], Link]:
@@ -298,7 +301,7 @@ class NavGraph:
         start
             Cell the robot comes from; None for anywhere.
         """
-        component = None if start is None else int(self.components[start])
+        component = None if start is None else int(self.components[self._own(start)])
         stops: list[Stop] = []
         unreached: list[Unreached] = []
         for target, cell in self.targets:
@@ -331,6 +334,7 @@ class NavGraph:
         global_id
             By which `without_obstacle` knows it; derived from place and form if not given.
         """
+        _checks.need("polygon", polygon, shapely.Geometry)
         if not polygon.is_valid or polygon.is_empty:
             raise GeometryError(f"{name} has no valid plan view.", "Give a simple polygon in metres.")
         index = self._storey(storey)
@@ -390,11 +394,14 @@ class NavGraph:
         return self._changed(placed=(*self.changes.placed, *placed))
 
     def _flat(self, cells: Iterable[Cell]) -> NDArray[np.int64]:
-        cells = list(cells)
-        for cell in cells:
-            if cell not in self.frame:
-                raise GridError(f"{cell} is not a cell of a frame of shape {self.frame.shape}.")
-        return indexes_of(cells, self.frame)
+        return indexes_of([self._own(cell) for cell in _checks.many("cells", cells)], self.frame)
+
+    def _own(self, cell: Cell) -> Cell:
+        """Return a cell; refuse what is none of this graph."""
+        own = Cell(*_checks.cell("cell", cell))
+        if own not in self.frame:
+            raise GridError(f"{own} is not a cell of a frame of shape {self.frame.shape}.")
+        return own
 
     def _storey(self, storey: int | str) -> int:
         storeys = self.environment.storeys if self.environment else ()
@@ -471,7 +478,11 @@ class NavGraph:
         factor : anything that fits (storeys, rows, cols)
             Multiplier of the length of a step, at least 1; inf closes a cell.
         """
-        given = np.broadcast_to(np.asarray(factor, dtype=np.float32), self.frame.shape)
+        factors = _checks.numbers("factor", factor).astype(np.float32)
+        try:
+            given = np.broadcast_to(factors, self.frame.shape)
+        except ValueError as error:
+            raise GridError(f"factor is {factors.shape}, the frame is {self.frame.shape}.") from error
         cost = _frozen(np.where(self.free, given, np.float32(np.inf)))
         graph = replace(self, cost=cost, bare_cost=None, clearances=(), changes=self.changes.with_cost(given))
         if self.environment is None:
@@ -492,7 +503,8 @@ class NavGraph:
             Added to the multiplier right beside an obstacle; it falls with the square of the distance missing.
         """
         bare = self.cost if self.bare_cost is None else self.bare_cost
-        return replace(self, **self._costs(bare, (*self.clearances, (metres, weight))))
+        wanted = _checks.number("clearance", metres, 0), _checks.number("the weight of a clearance", weight, 0)
+        return replace(self, **self._costs(bare, (*self.clearances, wanted)))
 
     def _costs(self, bare: NDArray[np.float32], clearances: tuple[tuple[float, float], ...]) -> dict[str, Any]:
         """Return the fields of a graph of which the cost is known but for what clearances add."""
@@ -519,7 +531,7 @@ class NavGraph:
         """
         from bimnav._explain import explain_cell
 
-        return explain_cell(self, cell)
+        return explain_cell(self, self._own(cell))
 
     def edges(self) -> Edges:
         """Return all edges once: flat indexes of their two cells, and their cost.
@@ -664,6 +676,8 @@ def build_graph(
     GridTooLargeError
         If the cells would be too many; the message names a size that fits.
     """
+    _checks.need("environment", environment, IndoorEnvironment)
+    clearance = _checks.number("clearance", clearance, 0)
     if refine not in (None, "auto"):
         raise ValueRangeError(f"refine is {refine!r}.", "Give 'auto' or None.")
     if on_conflict not in ("approach", "reach"):

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav.errors import GridError, GridTooLargeError, OutsideMapError, ValueRangeError
 
 if TYPE_CHECKING:
@@ -73,6 +74,9 @@ class GridFrame:
 
     def __post_init__(self) -> None:
         _check_cell_size(self.cell_size)
+        for name in ("first_row", "first_col", "rows", "cols", "ground"):
+            _checks.whole(name, getattr(self, name))
+        object.__setattr__(self, "elevations", tuple(_checks.numbers("elevations", self.elevations).ravel().tolist()))
         if self.rows < 1 or self.cols < 1 or not self.elevations:
             raise GridError(f"a frame of {self.shape} cells is empty.", "Give at least one cell.")
         if not 0 <= self.ground < len(self.elevations):
@@ -104,9 +108,13 @@ class GridFrame:
             Cells added on every side.
         """
         _check_cell_size(cell_size)
-        x_min, y_min, x_max, y_max = (float(value) for value in bounds)
-        if not all(math.isfinite(value) for value in bounds) or x_min > x_max or y_min > y_max:
-            raise ValueRangeError(f"the box {tuple(bounds)} is not finite and ordered.")
+        elevations = _checks.many("elevations", elevations)
+        box = _checks.numbers("bounds", bounds).ravel().tolist()
+        if len(box) != 4:
+            raise ValueRangeError(f"bounds is {bounds!r:.80}.", "Give (x_min, y_min, x_max, y_max) in metres.")
+        x_min, y_min, x_max, y_max = box
+        if not all(math.isfinite(value) for value in box) or x_min > x_max or y_min > y_max:
+            raise ValueRangeError(f"the box {tuple(box)} is not finite and ordered.")
         size = max((x_max - x_min) / cell_size, (y_max - y_min) / cell_size)
         if size > CELL_LIMIT:  # before the numbers of rows and columns themselves run away
             shape = (
@@ -119,7 +127,7 @@ class GridFrame:
         first_row = math.floor(y_min / cell_size + _EDGE_SLACK) - margin
         cols = math.ceil(x_max / cell_size - _EDGE_SLACK) + margin - first_col
         rows = math.ceil(y_max / cell_size - _EDGE_SLACK) + margin - first_row
-        return cls(cell_size, first_row, first_col, max(rows, 1), max(cols, 1), tuple(elevations), ground)
+        return cls(cell_size, first_row, first_col, max(rows, 1), max(cols, 1), elevations, ground)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -153,8 +161,8 @@ class GridFrame:
         """Return the storey whose floor is the highest at or below a world height; `ground` for None."""
         if z is None:
             return self.ground
-        if not math.isfinite(z):
-            raise ValueRangeError(f"z is {z}.", "Give a world height in metres.")
+        if not _is_finite(z):
+            raise ValueRangeError(f"z is {z!r:.40}.", "Give a world height in metres.")
         below = [i for i, floor in enumerate(self.elevations) if floor <= z + 0.1]
         return max(below, key=lambda i: self.elevations[i]) if below else 0
 
@@ -175,8 +183,8 @@ class GridFrame:
         OutsideMapError
             If the point lies outside the frame.
         """
-        if not (math.isfinite(x) and math.isfinite(y)):
-            raise ValueRangeError(f"({x}, {y}) is not a point.", "Give finite world coordinates in metres.")
+        if not _is_finite(x, y):
+            raise ValueRangeError(f"({x!r:.40}, {y!r:.40}) is not a point.", "Give finite world coordinates in metres.")
         level = self.storey_at(z) if storey is None else storey
         cell = Cell(level, self._index(y) - self.first_row, self._index(x) - self.first_col)
         if cell not in self:
@@ -221,6 +229,13 @@ class GridFrame:
         return col * d, row * d, (col + 1) * d, (row + 1) * d
 
 
+def _is_finite(*numbers: float) -> bool:
+    try:
+        return all(map(math.isfinite, numbers))
+    except TypeError:  # not a number
+        return False
+
+
 def _check_cell_size(cell_size: Any) -> None:
     is_number = isinstance(cell_size, (float, int, np.floating, np.integer))
     if not (is_number and math.isfinite(cell_size) and cell_size >= 1e-3):
@@ -260,6 +275,9 @@ def rasterize(frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometry])
     -------
     occupied : (rows, cols) bool
     """
+    _checks.need("frame", frame, GridFrame)
+    if not isinstance(polygons, shapely.Geometry):
+        polygons = _checks.many("polygons", polygons, shapely.Geometry)
     occupied = np.zeros((frame.rows, frame.cols), dtype=np.bool_)
     _mark(frame, polygons, occupied, occupied)
     return occupied

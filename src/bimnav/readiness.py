@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from bimnav import _checks
 from bimnav._connectors import Ascent
 from bimnav._findings import findings
 from bimnav._gates import DoorCheck, Gates, doors_of
@@ -176,6 +177,7 @@ def readiness(building: Building, robot: Robot | None = None, *, cell_size: floa
     cell_size
         Edge of a cell in metres; larger cells are taken where the grid would be too large.
     """
+    _checks.need("robot", robot, Robot, or_none=True)
     robot = robot or Robot(radius=0.25)
     environment = make_environment(building, Task("readiness", "where a robot can go"), robot)
     connectors = building.ascents

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav._topology import Node, Topology, topology
 from bimnav._why import NoRoute, why_unreachable
 from bimnav.errors import NoPathError
@@ -98,6 +99,7 @@ class Replanner:
         at
             Free cell in which the robot is; None if it has not moved.
         """
+        _checks.need("graph", graph, NavGraph)
         before, ahead = self.graph, self._ahead(at)
         self.graph, self.at = graph, self.at if at is None else at
         if ahead is not None and self._still_holds(before, graph, ahead):

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
+from bimnav import _checks
 from bimnav.errors import ValueRangeError
 
 __all__ = ["RANGES", "Robot"]
@@ -118,7 +119,8 @@ class Robot:
             self._refuse("name", self.name, "Give a text.")
         for field, (low, high) in RANGES.items():
             value = getattr(self, field)
-            if value is not None and not _is_within(value, low, high):
+            is_left_out = value is None and field == "ground_clearance"
+            if not is_left_out and not _is_within(value, low, high):
                 self._refuse(field, value, f"Give a number from {low:g} to {high:g}.")
         if self.step_height >= self.height:
             raise ValueRangeError(
@@ -130,7 +132,7 @@ class Robot:
             words = getattr(self, field)
             if isinstance(words, str):
                 self._refuse(field, words, f"Give a list: [{words!r}].")
-            object.__setattr__(self, field, tuple(words))
+            object.__setattr__(self, field, _checks.many(field, words, str))
         if self.outline is not None:
             self._take_outline(self.outline)
 
@@ -154,7 +156,8 @@ class Robot:
 
     def _take_outline(self, corners: Iterable[Iterable[float]]) -> None:
         """Check the outline, turn it counter-clockwise, and find the circle around it."""
-        outline = tuple(tuple(float(value) for value in corner) for corner in corners)
+        given = _checks.numbers("outline", corners)
+        outline = tuple(map(tuple, given.tolist() if given.ndim == 2 else ()))
         hint = (
             "Give three corners (x, y) or more, in metres, of a polygon that holds (0, 0) and crosses itself nowhere."
         )

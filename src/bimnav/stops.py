@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
+from bimnav import _checks
 from bimnav.grid import Cell
 
 __all__ = ["Approach", "Stand", "Stop", "Unreached"]
@@ -84,6 +85,7 @@ class Stop:
     kind: Literal["target", "charger"] = "target"
 
     def __post_init__(self) -> None:
+        _checks.fields(self, numbers="service_time priority due")
         own = Stand(self.cell, self.end, self.distance, self.heading)
         object.__setattr__(self, "candidates", tuple(self.candidates) or (own,))
 

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from bimnav import _checks
 from bimnav._georeference import Georeference, turn_of
 from bimnav._select import select_by_hand
 from bimnav.building import Building, Door, Element, Facts, Issue, Ledger, Opening, Space, Storey
@@ -78,6 +79,7 @@ def federate(buildings: Sequence[Building], *, offsets: Sequence[ArrayLike | Non
     ValueRangeError
         If there is no building, or the offsets do not fit.
     """
+    buildings = _checks.many("buildings", buildings, Building)
     if not buildings:
         raise ValueRangeError("there is no building to join.", "Give at least one.")
     wanted = checked_offsets(offsets, len(buildings))

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bimnav import search
+from bimnav import _checks, search
 from bimnav.errors import InputError, NoPathError, ValueRangeError
 from bimnav.plan._routing import Robots, route
 from bimnav.plan.orders import Groups, checked_costs, checked_groups, gap_of, order_stops
@@ -123,7 +123,9 @@ def assign_stops(
     """
     if objective not in ("total", "makespan"):
         raise ValueRangeError(f"objective is {objective!r}.", "Give 'total' or 'makespan'.")
-    robots = _robots(matrix, starts, ends, return_to_start, capacities, allowed)
+    if time_limit is not None:
+        _checks.number("time_limit", time_limit, 0)
+    robots = _robots(matrix, _checks.many("starts", starts), ends, return_to_start, capacities, allowed)
     n = len(robots.costs[0])
     ways = checked_groups(groups, n, {*robots.starts, *robots.ends})
     needs = None if demands is None else _numbers("demands", demands, (n,))
@@ -136,7 +138,7 @@ def assign_stops(
         routes, is_cut_short = _searched(robots, ways, needs, objective, time_limit)
     if routes is None:
         raise NoPathError(
-            f"no assignment of {len(ways)} stops to {len(starts)} robots was found that serves them all.",
+            f"no assignment of {len(ways)} stops to {len(robots.starts)} robots was found that serves them all.",
             "Leave out stops that no robot can reach or is allowed to serve, or give the robots more capacity.",
         )
     whole = tuple((start, *rows) for start, rows in zip(robots.starts, routes, strict=True))
@@ -157,19 +159,22 @@ def _robots(
 ) -> Robots:
     if not starts:
         raise InputError("there is no robot to assign stops to.", "Give the start of one at least.")
-    given = np.asarray(matrix, dtype=np.float64)
+    given = _checks.numbers("matrix", matrix)
     costs = [checked_costs(given)] * len(starts) if given.ndim != 3 else [checked_costs(part) for part in given]
     if len(costs) != len(starts):
         raise InputError(f"there are {len(costs)} matrices for {len(starts)} robots.", "Give one for all, or one each.")
     if ends is not None and return_to_start:
         raise InputError("robots cannot both end elsewhere and return.", "Give ends or return_to_start, not both.")
-    last: list[int | None] = [*starts] if return_to_start else [*(ends or [None] * len(starts))]
+    given_ends = [None] * len(starts) if ends is None else _checks.many("ends", ends)
+    last: list[int | None] = [*starts] if return_to_start else [*given_ends]
     if len(last) != len(starts):
         raise InputError(f"there are {len(last)} ends for {len(starts)} robots.", "Give one each.")
     n = len(costs[0])
-    for row in (*starts, *last):
-        if row is not None and not 0 <= row < n:
-            raise ValueRangeError(f"a robot starts or ends at {row}, the matrix has rows 0 to {n - 1}.")
+    for row in starts:
+        _checks.whole("a start", row, 0, n - 1)
+    for end in last:
+        if end is not None:
+            _checks.whole("an end", end, 0, n - 1)
     most = None if capacities is None else _numbers("capacities", capacities, (len(starts),))
     served = None if allowed is None else np.array(allowed, dtype=np.bool_)
     if served is not None and served.shape != (len(starts), n):
@@ -178,7 +183,7 @@ def _robots(
 
 
 def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    numbers = np.array(values, dtype=np.float64)
+    numbers = _checks.numbers(name, values)
     if numbers.shape != shape:
         raise InputError(f"{name} has shape {numbers.shape}.", f"Give {shape}.")
     if not (np.isfinite(numbers).all() and (numbers >= 0).all()):

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bimnav import search
+from bimnav import _checks, search
 from bimnav.errors import InputError, NoPathError, ValueRangeError
 
 __all__ = ["StopOrder", "checked_costs", "checked_groups", "gap_of", "order_stops"]
@@ -109,9 +109,10 @@ def order_stops(
     """
     cost = checked_costs(matrix)
     n = len(cost)
-    for name, row in (("start", start), ("end", end)):
-        if row is not None and not 0 <= row < n:
-            raise ValueRangeError(f"{name} is {row}, the matrix has rows 0 to {n - 1}.")
+    start = _checks.whole("start", start, 0, n - 1)
+    end = None if end is None else _checks.whole("end", end, 0, n - 1)
+    if time_limit is not None:
+        _checks.number("time_limit", time_limit, 0)
     if end is not None and return_to_start and end != start:
         raise InputError("a tour cannot both end elsewhere and return.", "Give end or return_to_start, not both.")
     if end == start:
@@ -153,7 +154,7 @@ def gap_of(length: float, bound: float) -> float:
 
 def checked_costs(matrix: ArrayLike) -> NDArray[np.float64]:
     """Return a private copy of costs between rows, with nothing to pay for staying."""
-    cost = np.array(matrix, dtype=np.float64)
+    cost = _checks.numbers("matrix", matrix)
     if cost.ndim != 2 or cost.shape[0] != cost.shape[1] or not cost.size:
         raise InputError(f"a matrix of shape {cost.shape} orders nothing.", "Give (n, n) costs, at least one row.")
     if np.isnan(cost).any() or (cost < 0).any():
@@ -177,7 +178,7 @@ def checked_groups(groups: ArrayLike | None, n: int, ends: set[int | None]) -> G
 def _row_values(name: str, values: ArrayLike | None, n: int, default: float) -> NDArray[np.float64]:
     if values is None:
         return np.full(n, default)
-    given = np.array(values, dtype=np.float64)
+    given = _checks.numbers(name, values)
     if given.shape != (n,):
         raise InputError(f"{name} has shape {given.shape}, the matrix {n} rows.", "Give one number for each row.")
     if np.isnan(given).any() or (name != "priority" and (given < 0).any()):

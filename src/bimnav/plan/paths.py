@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from bimnav import search
+from bimnav import _checks, search
 from bimnav._why import why_unreachable
 from bimnav.errors import (
     GoalBlockedError,
@@ -175,6 +175,7 @@ def find_path(
         raise ValueRangeError(f"algorithm is {algorithm!r}.", "Give 'auto', 'astar' or 'dijkstra'.")
     if engine not in ("compiled", "rustworkx"):
         raise ValueRangeError(f"engine is {engine!r}.", "Give 'compiled' or 'rustworkx'.")
+    _checks.need("graph", graph, NavGraph)
     check_smooth(smooth)
     graph = graph if objective is None else _with_objective(graph, objective)
     begin = free_index(graph, start, "start")
@@ -274,7 +275,8 @@ def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[n
 
 def source_indexes(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[np.int64]:
     """Return the flat indexes of free cells, at least one."""
-    cells = [sources] if isinstance(sources, Cell) else list(sources)
+    _checks.need("graph", graph, NavGraph)
+    cells = (sources,) if isinstance(sources, Cell) else _checks.many("sources", sources)
     if not cells:
         raise InputError("a distance field needs a source.", "Give at least one free cell.")
     return np.array([free_index(graph, cell, "start") for cell in cells])
@@ -300,7 +302,8 @@ def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float6
     OutsideMapError
         If a cell is not one of the graph's.
     """
-    index = np.array([_index(graph, cell, "cell") for cell in cells], dtype=np.int64)
+    _checks.need("graph", graph, NavGraph)
+    index = np.array([_index(graph, cell, "cell") for cell in _checks.many("cells", cells)], dtype=np.int64)
     matrix = np.full((len(index), len(index)), np.inf)
     np.fill_diagonal(matrix, 0.0)
     free = np.flatnonzero(np.isfinite(graph.cost.ravel()[index]))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bimnav import _checks
 from bimnav.errors import InputError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
@@ -128,13 +129,23 @@ def plan_tours(
     OutsideMapError, StartBlockedError
         If a start lies outside the map or is blocked.
     """
+    _checks.need("graph", graph, NavGraph)
+    starts = _checks.many("starts", starts)
+    stops = None if stops is None else _checks.many("stops", stops, Stop)
+    chargers = None if chargers is None else _checks.many("chargers", chargers, Stop)
     for start in starts:
         free_index(graph, start, "start")
     if robots is None:
         one = Robot() if graph.environment is None else graph.environment.robot
         robots = [replace(one, name=f"R{k + 1}") for k in range(len(starts))]
+    robots = _checks.many("robots", robots, Robot)
     if len(robots) != len(starts):
         raise InputError(f"there are {len(robots)} robots and {len(starts)} starts.", "Give one start for each robot.")
+    points = [None] * len(starts) if start_points is None else _checks.many("start_points", start_points)
+    if len(points) != len(starts):
+        raise InputError(
+            f"there are {len(points)} start_points and {len(starts)} starts.", "Give one point for each start."
+        )
     unreached: list[Unreached] = []
     if stops is None:
         stops, lost = _stops_from(graph, starts)
@@ -184,7 +195,7 @@ def plan_tours(
                 own,
                 algorithm=algorithm,
                 return_to_start=return_to_start,
-                start_point=None if start_points is None else start_points[k],
+                start_point=points[k],
                 robot=robot,
                 chargers=chargers,
             )

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav._why import why_unreachable
 from bimnav.errors import InputError
 from bimnav.graph import NavGraph
@@ -211,8 +212,13 @@ def plan_tour(
     InputError
         If the tour should both end elsewhere and return.
     """
+    _checks.need("graph", graph, NavGraph)
+    _checks.need("robot", robot, Robot, or_none=True)
+    stops = None if stops is None else _checks.many("stops", stops, Stop)
+    chargers = None if chargers is None else _checks.many("chargers", chargers, Stop)
     check_smooth(smooth)
     free_index(graph, start, "start")
+    start_point = None if start_point is None else _checks.point("start_point", start_point)
     if end is not None:
         if return_to_start and end != start:
             raise InputError("a tour cannot both end elsewhere and return.", "Give end or return_to_start, not both.")

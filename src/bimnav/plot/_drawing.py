@@ -15,6 +15,7 @@ from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
+from bimnav import _checks
 from bimnav._cards import ROBOTS
 from bimnav._wording import printable
 from bimnav.errors import ValueRangeError
@@ -48,6 +49,7 @@ __all__ = [
     "patches_of",
     "plain",
     "shown_box",
+    "storey_of",
     "unit_for",
 ]
 
@@ -89,11 +91,17 @@ def plain(name: str) -> str:
 
 
 def axes_for(ax: Axes | None, bounds: Sequence[float]) -> Axes:
+    _checks.need("ax", ax, "Axes", or_none=True)
     if ax is not None:
         return ax
     from matplotlib import pyplot as plt
 
     return plt.subplots(figsize=figure_size(bounds))[1]
+
+
+def storey_of(storey: int | None, default: int, elevations: Sequence[float]) -> int:
+    """Return the storey to draw."""
+    return default if storey is None else _checks.whole("storey", storey, 0, len(elevations) - 1)
 
 
 def figure_size(bounds: Sequence[float]) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from bimnav import _checks
 from bimnav.errors import InputError
 from bimnav.footprint import footprints_of
 from bimnav.plot._drawing import (
@@ -38,6 +39,7 @@ from bimnav.plot._drawing import (
     patches_of,
     plain,
     shown_box,
+    storey_of,
     unit_for,
 )
 
@@ -83,6 +85,7 @@ def plot_building(
     unit
         Of the axes; None takes feet for models in feet, else metres.
     """
+    _checks.need("building", building, "Building")
     index = building.storey_index(storey)
     level = building.storeys[index].elevation
     elements = [e for e in building.elements if e.shapes]
@@ -157,11 +160,13 @@ def plot_field(
     unit
         Of the axes; None takes feet for models in feet, else metres.
     """
+    _checks.need("graph", graph, "NavGraph")
+    field = _checks.numbers("field", field)
     if np.shape(field) != graph.frame.shape:
         raise InputError(
             f"the field is {np.shape(field)}, the graph {graph.frame.shape}.", "Give a value for each cell."
         )
-    storey = graph.frame.ground if storey is None else storey
+    storey = storey_of(storey, graph.frame.ground, graph.frame.elevations)
     bounds = shown_box(graph, storey)
     ax = axes_for(ax, bounds)
     values = np.ma.masked_invalid(np.asarray(field[storey], dtype=np.float64))
@@ -197,8 +202,10 @@ def plot_fleet(
     unit
         Of the axes; None takes feet for models in feet, else metres.
     """
+    if not isinstance(getattr(plan, "tours", None), tuple):
+        _checks.need("plan", plan, "TeamPlan")
     graph = plan.tours[0].graph
-    storey = plan.tours[0].start.storey if storey is None else storey
+    storey = storey_of(storey, plan.tours[0].start.storey, graph.frame.elevations)
     ax = plot_graph(graph, storey=storey, ax=ax, unit=unit)
     level = graph.frame.elevations[storey]
     key: list[Any] = []
@@ -237,6 +244,8 @@ def plot_environment(
     unit
         Of the axes; None takes feet for models in feet, else metres.
     """
+    _checks.need("environment", environment, "IndoorEnvironment")
+    storey = storey_of(storey, 0, environment.levels)
     regions = [r.polygon for r in environment.regions if r.storey == storey]
     shown = shapely.geometrycollections([*regions, *(o.footprint for o in environment.obstacles_on(storey))])
     bounds = box_around(shown.bounds if not shown.is_empty else (0, 0, 1, 1))
@@ -266,7 +275,8 @@ def plot_graph(graph: NavGraph, *, storey: int | None = None, ax: Axes | None = 
     unit
         Of the axes; None takes feet for models in feet, else metres.
     """
-    storey = graph.frame.ground if storey is None else storey
+    _checks.need("graph", graph, "NavGraph")
+    storey = storey_of(storey, graph.frame.ground, graph.frame.elevations)
     bounds = shown_box(graph, storey)
     ax = axes_for(ax, bounds)
     key = draw_cells(ax, graph, storey)
@@ -292,8 +302,9 @@ def plot_tour(tour: Tour, *, storey: int | None = None, ax: Axes | None = None, 
     unit
         Of the axes; None takes feet for models in feet, else metres.
     """
+    _checks.need("tour", tour, "Tour")
     graph = tour.graph
-    storey = tour.start.storey if storey is None else storey
+    storey = storey_of(storey, tour.start.storey, graph.frame.elevations)
     ax = plot_graph(graph, storey=storey, ax=ax, unit=unit)
     level = graph.frame.elevations[storey]
     legs, climbs = _parts_of(tour, level)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bimnav import _checks
+from bimnav.errors import InputError
 from bimnav.plot._drawing import ROBOTS, add_key
 
 if TYPE_CHECKING:
@@ -52,11 +54,15 @@ def plot_study(
     ValueRangeError
         If there is no such result or setting.
     """
+    _checks.need("study", study, "Study")
+    _checks.need("ax", ax, "Axes", or_none=True)
+    if study.is_in_vain:
+        raise InputError(f"there is nothing to draw: {study!r}.", "Its rows say what to change.")
+    means = study.summary(result, [by, group])
     if ax is None:
         from matplotlib import pyplot as plt
 
         ax = plt.subplots(figsize=(5.2, 3.0))[1]
-    means = study.summary(result, [by, group])
     places = {value: k for k, value in enumerate(dict.fromkeys(row[by] for row in study.rows))}
     groups = list(dict.fromkeys(row[group] for row in study.rows))
     for k, value in enumerate(groups):

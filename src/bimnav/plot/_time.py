@@ -13,9 +13,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
+from bimnav import _checks
 from bimnav._files import write_bytes
 from bimnav.errors import InputError, MissingExtraError, ValueRangeError
-from bimnav.plot._drawing import ROBOTS, STATUSES, add_key, plain, shown_box
+from bimnav.plot._drawing import ROBOTS, STATUSES, add_key, plain, shown_box, storey_of
 from bimnav.plot._plans import plot_graph
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ def plot_timeline(result: SimResult, *, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new figure if None.
     """
+    _checks.need("result", result, "SimResult")
+    _checks.need("ax", ax, "Axes", or_none=True)
     if ax is None:
         from matplotlib import pyplot as plt
 
@@ -98,14 +101,13 @@ def animate(
     OutputError
         If the file cannot be written.
     """
-    target = Path(path)
+    _checks.need("result", result, "SimResult")
+    target = _checks.path("path", path)
     kind = target.suffix.lower()
     if kind not in (".gif", ".mp4"):
         raise InputError(f"{target.name!r} is neither a .gif nor an .mp4 file.", "Name the file so.")
-    if not (0 < speed < np.inf and 1 <= frames_per_second <= 60):
-        raise ValueRangeError(
-            f"speed is {speed}, frames_per_second {frames_per_second}.", "Give numbers above 0; at most 60 frames."
-        )
+    _checks.number("speed", speed, 1e-3, 1e6)
+    _checks.number("frames_per_second", frames_per_second, 1, 60)
     begin, end = result.span
     count = int(np.ceil((end - begin) / speed * frames_per_second)) + 1
     if count > _MOST_FRAMES:
@@ -116,7 +118,8 @@ def animate(
     if kind == ".mp4" and not FFMpegWriter.isAvailable():
         raise MissingExtraError("an .mp4 file needs ffmpeg.", "Install ffmpeg, or write a .gif file.")
     times = np.append(np.arange(count - 1) * (speed / frames_per_second) + begin, end)
-    shown = result.tours[0].start.storey if storey is None else storey
+    tour = result.tours[0]
+    shown = storey_of(storey, tour.start.storey, tour.graph.frame.elevations)
     figure, update = _moving_plan(result, shown)
     writer: Any = PillowWriter(fps=frames_per_second) if kind == ".gif" else FFMpegWriter(fps=frames_per_second)
     with tempfile.TemporaryDirectory() as folder, mpl.rc_context({"savefig.bbox": None}):

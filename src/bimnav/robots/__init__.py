@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
@@ -12,6 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from bimnav import _checks
 from bimnav._table_files import Folders, TableFiles, is_path, parted
 from bimnav._toml import Problem, Toml, read_toml
 from bimnav._wording import meant, nearest
@@ -93,7 +93,7 @@ def load_robot(robot: str | PathLike[str], name: str | None = None, *, robots_pa
     >>> load_robot("inspection").reach
     1.0
     """
-    text = os.fspath(robot)
+    text = str(_checks.path("robot", robot)) if not isinstance(robot, str) else robot
     if isinstance(robot, str):
         if name is None:
             text, name = parted(text, "#")

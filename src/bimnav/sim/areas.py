@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav.errors import ValueRangeError
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class Passage:
     capacity: int = 1
 
     def __post_init__(self) -> None:
+        _checks.fields(self, wholes="storey capacity", texts="name", shapes="polygon")
         if self.capacity < 1 or self.polygon.is_empty:
             raise ValueRangeError(
                 f"passage {self.name!r} takes {self.capacity} robots on {self.polygon.area:g} m².",
@@ -70,6 +72,7 @@ class SpeedLimit:
     storey: int = 0
 
     def __post_init__(self) -> None:
+        _checks.fields(self, numbers="speed", wholes="storey", shapes="polygon")
         if not 0 < self.speed < math.inf:
             raise ValueRangeError(f"a speed limit of {self.speed} m/s is none.", "Give a speed above 0.")
 

@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from bimnav import _checks
 from bimnav.errors import ValueRangeError
 
 __all__ = ["Chance", "Unit", "seeded"]
@@ -60,7 +61,9 @@ class Chance:
     least: float = 0.0
 
     def __post_init__(self) -> None:
-        values = tuple(float(value) for value in self.values)
+        for name in ("shape", "unit"):
+            _checks.need(name, getattr(self, name), str)
+        values = tuple(_checks.number("a value", value) for value in _checks.many("values", self.values))
         object.__setattr__(self, "values", values)
         if self.unit not in _SI or self.shape not in _COUNT:
             raise ValueRangeError(

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from bimnav import _checks
 from bimnav.errors import ValueRangeError
 
 if TYPE_CHECKING:
@@ -24,9 +25,28 @@ __all__ = [
     "ZoneHazardous",
 ]
 
+_KINDS = {
+    "numbers": "time until x y priority repair_time width",
+    "wholes": "storey",
+    "texts": "name global_id robot",
+    "shapes": "polygon",
+}
+
+
+class _Checked:
+    """Checks the fields of a change."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        has = type(self).__dataclass_fields__  # type: ignore[attr-defined]
+        known = {kind: " ".join(name for name in names.split() if name in has) for kind, names in _KINDS.items()}
+        _checks.fields(self, **known)
+        _checks.number("width of Emergency", getattr(self, "width", 0.0), 0)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ObstacleAppears:
+class ObstacleAppears(_Checked):
     """Something stands where there was floor.
 
     Parameters
@@ -51,7 +71,7 @@ class ObstacleAppears:
 
 
 @dataclass(frozen=True, slots=True)
-class ObstacleRemoved:
+class ObstacleRemoved(_Checked):
     """An obstacle that appeared is gone, and everybody knows."""
 
     time: float
@@ -59,7 +79,7 @@ class ObstacleRemoved:
 
 
 @dataclass(frozen=True, slots=True)
-class DoorLocks:
+class DoorLocks(_Checked):
     """A door is locked; only robots with its key open it."""
 
     time: float
@@ -67,7 +87,7 @@ class DoorLocks:
 
 
 @dataclass(frozen=True, slots=True)
-class DoorUnlocks:
+class DoorUnlocks(_Checked):
     """A door is no longer locked: it is closed, and opens for robots that open doors."""
 
     time: float
@@ -75,7 +95,7 @@ class DoorUnlocks:
 
 
 @dataclass(frozen=True, slots=True)
-class TargetReported:
+class TargetReported(_Checked):
     """There is something more to do; the robot that gets there with the shortest detour does it.
 
     Parameters
@@ -104,7 +124,7 @@ class TargetReported:
 
 
 @dataclass(frozen=True, slots=True)
-class RobotFails:
+class RobotFails(_Checked):
     """A robot stands still; others take over what it had to do, and drive around it.
 
     Parameters
@@ -123,7 +143,7 @@ class RobotFails:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ZoneHazardous:
+class ZoneHazardous(_Checked):
     """Floor that no robot may enter; who is on it leaves by the shortest way.
 
     Parameters
@@ -146,7 +166,7 @@ class ZoneHazardous:
 
 
 @dataclass(frozen=True, slots=True)
-class Emergency:
+class Emergency(_Checked):
     """People leave the building: robots clear the way out, and stay where they are in nobody's way.
 
     Parameters
@@ -195,6 +215,7 @@ class Sensing:
     period: float = 1.0
 
     def __post_init__(self) -> None:
+        _checks.fields(self, numbers="range probability period")
         if not (0 <= self.range < math.inf and 0 <= self.probability <= 1 and 0 < self.period < math.inf):
             raise ValueRangeError(
                 f"sensing has range {self.range}, probability {self.probability}, period {self.period}.",

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
+from bimnav import _checks
 from bimnav._doorways import doorway_of
 from bimnav.errors import ModelError, ValueRangeError
 from bimnav.robot import Robot
@@ -48,6 +49,7 @@ class SimDoor:
     storey: int = 0
 
     def __post_init__(self) -> None:
+        _checks.fields(self, numbers="opening_time", wholes="storey", texts="global_id name", shapes="polygon")
         if self.state not in get_args(DoorState):
             known = ", ".join(map(repr, get_args(DoorState)))
             raise ValueRangeError(f"door {self.global_id}: state is {self.state!r}.", f"Known are {known}.")

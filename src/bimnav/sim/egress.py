@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav._doorways import doorway_of
 from bimnav.building import Element, Space
 from bimnav.errors import InputError
@@ -45,7 +46,8 @@ def egress_distances(graph: NavGraph, exits: Iterable[Cell] | None = None) -> ND
     InputError
         If there is no exit.
     """
-    cells = exit_cells(graph) if exits is None else list(exits)
+    _checks.need("graph", graph, "NavGraph")
+    cells = exit_cells(graph) if exits is None else _checks.many("exits", exits)
     if not cells:
         raise InputError(
             "the building has no exit that a robot of this size can stand in.",

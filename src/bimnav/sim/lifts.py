@@ -9,6 +9,7 @@ from typing import Any
 
 import simpy
 
+from bimnav import _checks
 from bimnav.errors import ValueRangeError
 
 __all__ = ["Cabin", "Lift", "Rider"]
@@ -50,6 +51,7 @@ class Lift:
     depth: float = 0.0
 
     def __post_init__(self) -> None:
+        _checks.fields(self, numbers="x y reach travel_time door_time depth", wholes="capacity storey", texts="name")
         times = (self.travel_time, self.door_time, self.reach, self.depth)
         if self.capacity < 1 or not all(0 <= value < math.inf for value in times):
             raise ValueRangeError(

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeAlias
 
 from bimnav._files import write_text
@@ -161,7 +160,7 @@ class EventLog:
         columns = [column for column in self.columns if column not in silent]
         text = csv_text(columns, ([getattr(row, column) for column in columns] for row in self.rows))
         if path is not None:
-            write_text(Path(path), text)
+            write_text(path, text)
         return text
 
     def to_dataframe(self) -> pandas.DataFrame:

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav.sim.areas import Passage
 
 if TYPE_CHECKING:
@@ -42,8 +43,9 @@ def find_passages(graph: NavGraph, radius: float) -> tuple[Passage, ...]:
     """
     from scipy import ndimage
 
+    _checks.need("graph", graph, "NavGraph")
     d = graph.frame.cell_size
-    if radius <= 0:
+    if _checks.number("radius", radius, 0) == 0:
         return ()
     across = math.ceil(2 * radius / d - 1e-9)
     rows, cols = (np.mgrid[:across, :across] + 0.5 - across / 2) ** 2

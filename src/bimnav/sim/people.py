@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav.errors import InputError, ValueRangeError
 from bimnav.grid import Cell
 from bimnav.plan import find_path
@@ -55,16 +56,17 @@ class Person:
     back_and_forth: bool = False
 
     def __post_init__(self) -> None:
+        _checks.fields(self, numbers="speed radius start", wholes="storey", texts="name")
         if not (0 < self.speed < math.inf and 0 <= self.radius < math.inf and math.isfinite(self.start)):
             raise ValueRangeError(
                 f"{self.name!r} walks at {self.speed} m/s with radius {self.radius} m from {self.start} s.",
                 "Give a speed above 0, a radius of 0 or more, and a finite start.",
             )
         if self.route is not None:
-            route = tuple((float(x), float(y)) for x, y in self.route)
-            if len(route) < 2 or not all(math.isfinite(value) for point in route for value in point):
+            line = _checks.numbers(f"the route of {self.name!r}", self.route)
+            if line.ndim != 2 or line.shape[1] != 2 or len(line) < 2 or not np.isfinite(line).all():
                 raise InputError(f"the route of {self.name!r} is no line.", "Give two points or more, in metres.")
-            object.__setattr__(self, "route", route)
+            object.__setattr__(self, "route", tuple((x, y) for x, y in line.tolist()))
 
 
 @dataclass(slots=True)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav._files import write_text
-from bimnav.errors import InputError, MissingExtraError, ValueRangeError
+from bimnav.errors import InputError, MissingExtraError
 from bimnav.robot import Robot
 from bimnav.sim.clearance import (
     Encounter,
@@ -261,8 +262,7 @@ class SimResult:
         robot
             Its name; None if there is only one.
         """
-        if math.isnan(time):
-            raise ValueRangeError("the time is not a number.", "Give seconds.")
+        time = _checks.number("time", time)
         index, track = self._index(robot), self.track_of(robot)
         row = int(track.rows_at(time))
         x, y, z = track.points_at(time).tolist()

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, cast, get_args, runtime_checkable
 
 import numpy as np
 import simpy
 
+from bimnav import _checks
 from bimnav.errors import InputError, ValueRangeError
 from bimnav.plan.tours import find_chargers
 from bimnav.robot import Robot
@@ -136,21 +137,29 @@ def simulate(
         If robots, or people, share a name, or their number is not that of the tours.
     """
     tours = _tours_of(plan)
+    _checks.need("graph", graph, "NavGraph", or_none=True)
     if graph is not None and any(tour.graph.frame != graph.frame for tour in tours):
         raise InputError("the plan was made on another graph.", "Give the graph it was made on, or none.")
     starts = _starts(start_time, len(tours))
     fleet = _fleet(plan, tours, robot, robots)
-    events, people = tuple(events), tuple(people)
+    events, people = _changes(events), _checks.many("people", people, Person)
+    passages, limits = (
+        _checks.many("passages", passages, Passage),
+        _checks.many("speed_limits", speed_limits, SpeedLimit),
+    )
+    lifts = _lifts_in(tours[0].graph) if lifts is None else _checks.many("lifts", lifts, Lift)
+    for thing in (*events, *people, *passages, *limits, *lifts):
+        storey = getattr(thing, "storey", 0)
+        _checks.whole(f"storey of {type(thing).__name__}", storey, 0, len(tours[0].graph.frame.elevations) - 1)
+    _check_choices(sensing, policy, rng, on_event)
     environment = tours[0].graph.environment
     task = None if environment is None else environment.task
     begin = min(starts)
-    if not until >= begin or patience != patience or patience < 0:
-        raise ValueRangeError(
-            f"until is {until}, patience is {patience}.", "Give seconds: an end after the start, 0 or more to wait."
-        )
+    until, patience = _checks.number("until", until, begin), _checks.number("patience", patience, 0)
     streams = _streams(rng or np.random.default_rng(0), len(tours), people)
     walkers = _walkers(people, tours[0].graph, streams[len(tours) :], begin)
     named = [SimDoor(global_id, "open") for global_id in doors_named(events)]
+    doors = _checks.many("doors", doors, SimDoor)
     given = {door.global_id: door for door in (*named, *_slow_doors(environment), *doors)}
     setting = Setting(
         service_time=_default_service(task) if service_time is None else service_time,
@@ -160,10 +169,12 @@ def simulate(
         patience=patience,
         start_times=starts,
         doors=doors_in(environment, given.values()),
-        passages=tuple(passages),
-        lifts=_lifts_in(tours[0].graph) if lifts is None else tuple(lifts),
-        limits=tuple(speed_limits),
-        chargers=_chargers_in(tours, _docks_of(tours[0], fleet) if chargers is None else tuple(chargers)),
+        passages=passages,
+        lifts=lifts,
+        limits=limits,
+        chargers=_chargers_in(
+            tours, _docks_of(tours[0], fleet) if chargers is None else _checks.many("chargers", chargers, Charger)
+        ),
         walkers=walkers,
         is_eventful=bool(events or people or math.isfinite(until) or any(math.isfinite(r.battery_wh) for r in fleet)),
         keeps_history=history,
@@ -224,15 +235,36 @@ def _result(
 
 def _tours_of(plan: Tour | Sequence[Tour] | Plan) -> tuple[Tour, ...]:
     listed: Any = getattr(plan, "tours", None)
-    tours: Sequence[Any] = listed if listed is not None else plan if isinstance(plan, Sequence) else (plan,)
-    if not len(tours):
+    given: Any = listed if listed is not None else plan
+    tours: tuple[Any, ...] = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,)
+    if not tours:
         raise InputError("there is no tour to play.", "Give at least one.")
-    return tuple(tours)
+    for tour in tours:
+        _checks.tour("plan", tour)
+    return tours
+
+
+def _changes(events: Iterable[Change]) -> tuple[Change, ...]:
+    changes = _checks.many("events", events)
+    for change in changes:
+        if not isinstance(change, get_args(Change)):
+            raise ValueRangeError(f"{change!r:.80} is no change of the world.", "Give values such as ObstacleAppears.")
+    return changes
+
+
+def _check_choices(sensing: object, policy: object, rng: object, on_event: object) -> None:
+    _checks.need("sensing", sensing, Sensing, or_none=True)
+    _checks.need("rng", rng, np.random.Generator, or_none=True)
+    _checks.function("on_event", on_event)
+    if policy not in get_args(Decision) and not callable(policy):
+        known = ", ".join(map(repr, get_args(Decision)))
+        raise ValueRangeError(f"policy is {policy!r:.80}.", f"Give {known}, or a function.")
 
 
 def _starts(start_time: float | Sequence[float], count: int) -> tuple[float, ...]:
     starts = tuple(start_time) if isinstance(start_time, Sequence) else (start_time,) * count
-    if len(starts) != count or not all(abs(start) <= LATEST for start in starts):
+    starts = tuple(_checks.number("start_time", start, -LATEST, LATEST) for start in starts)
+    if len(starts) != count:
         raise ValueRangeError(
             f"start_time is {start_time}.",
             f"Give seconds from {-LATEST:g} to {LATEST:g}, one number or one for every robot.",
@@ -248,8 +280,9 @@ def _fleet(
         raise InputError("both robot and robots are given.", "Give one of them.")
     if robots is None and robot is None:
         robots = getattr(plan, "robots", None) or None
+    _checks.need("robot", robot, Robot, or_none=True)
     if robots is not None:
-        fleet = tuple(robots)
+        fleet = _checks.many("robots", robots, Robot)
     else:
         environment = tours[0].graph.environment
         robot = robot or (Robot() if environment is None else environment.robot)

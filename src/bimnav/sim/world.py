@@ -211,10 +211,11 @@ class World:
         given = self.setting.speed
         if given is None:
             return agent.robot.speed
-        speed = float(given(agent.robot, agent.rng) if callable(given) else given)
+        found = given(agent.robot, agent.rng) if callable(given) else given
+        speed = float(found) if isinstance(found, (int, float, np.integer, np.floating)) else math.nan
         if not 0 < speed < math.inf:
             raise SimulationError(
-                f"the speed of robot {agent.robot.name!r} is {speed}.",
+                f"the speed of robot {agent.robot.name!r} is {found!r:.80}.",
                 "Give metres per second above 0, or a function of robot and generator that returns them.",
                 {"robot": agent.robot.name},
             )

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+from bimnav import _checks
 from bimnav._table_files import Folders, TableFiles, is_path, parted
 from bimnav._toml import Problem, Toml, read_toml
 from bimnav._wording import nearest
@@ -115,7 +116,7 @@ def load_task(task: str | Path, name: str | None = None, *, tasks_path: Folders 
             task, name = parted(task, ":")
         if not is_path(task):
             return _named(task, name, _library() if task in _library() else _known(tasks_path))
-    path = Path(task)
+    path = _checks.path("task", task)
     tasks = _tasks([_read(_FILES.text_of(path), str(path))], lambda: _known(tasks_path))
     return _chosen(tasks, name, str(path))
 

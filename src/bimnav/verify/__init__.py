@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bimnav import _checks
 from bimnav._service_check import unserved
 from bimnav.errors import GeometryError
 from bimnav.verify._bodies import check_bodies, make_body
@@ -61,6 +62,7 @@ def check_path(
     GeometryError
         If `points` has another shape. Points that are not finite are a violation.
     """
+    _checks.need("environment", environment, "IndoorEnvironment")
     return _judge([(None, _polyline(points))], surroundings(environment, ignore), body, [])
 
 
@@ -72,6 +74,7 @@ def check_plan(tour: Tour) -> Check:
     although its cell is blocked gets no mercy. From a standing stop the target must be in reach, and no wall
     may hide it.
     """
+    _checks.tour("tour", tour)
     route = [_polyline(line) for line in tour.route]
     torn = [*_tears(tour, route), *_unserved(tour)]
     legs: list[Leg] = list(enumerate(route)) or [(None, _polyline([tour.start_point]))]
@@ -81,7 +84,7 @@ def check_plan(tour: Tour) -> Check:
 
 
 def _polyline(points: ArrayLike) -> NDArray[np.float64]:
-    line = np.asarray(points, dtype=np.float64)
+    line = _checks.numbers("points", points)
     if line.size == 0:
         return np.empty((0, 3))
     if line.ndim != 2 or line.shape[1] != 3:

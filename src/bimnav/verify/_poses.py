@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.affinity import affine_transform
 
+from bimnav import _checks
 from bimnav.errors import GeometryError
 from bimnav.verify._verdict import Check, Owner, Violation, refusal, who
 from bimnav.verify._world import GAP, SAME, SLACK, World, surroundings
@@ -48,7 +49,8 @@ def check_poses(poses: ArrayLike, environment: IndoorEnvironment, *, ignore: Col
     GeometryError
         If `poses` has another shape.
     """
-    motion = np.asarray(poses, dtype=np.float64)
+    _checks.need("environment", environment, "IndoorEnvironment")
+    motion = _checks.numbers("poses", poses)
     if motion.ndim != 2 or motion.shape[1] != 4:
         raise GeometryError(f"a motion has shape {motion.shape}.", "Give an array of shape (n, 4): x, y, z, heading.")
     world = surroundings(environment, ignore)
