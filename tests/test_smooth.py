@@ -149,6 +149,21 @@ def test_expensive_floor_is_gone_around_where_that_pays():
     assert path.cost < 16
 
 
+def test_turns_move_where_the_cost_changes_gradually():
+    free = np.ones((40, 70), dtype=bool)
+    free[:25, 20:23] = free[15:, 45:48] = False
+    graph = NavGraph.from_mask(free, cell_size=0.1).with_clearance(0.8)
+    ratios = []
+    for rows in ((3, 30), (12, 20), (30, 8), (20, 37)):
+        start, goal = Cell(0, rows[0], 2), Cell(0, rows[1], 66)
+        plain, smooth = find_path(graph, start, goal), find_path(graph, start, goal, smooth="any_angle")
+        ratios.append(smooth.cost / plain.cost)
+        steps = np.diff(smooth.waypoints[:, :2], axis=0)
+        turns = np.degrees(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
+        assert np.abs(turns).max() < 45
+    assert max(ratios) < 0.98
+
+
 def test_an_unknown_way_of_smoothing_is_refused():
     graph = NavGraph.from_mask(np.ones((2, 2), dtype=bool))
     with pytest.raises(ValueRangeError, match="any_angle"):

@@ -2,7 +2,8 @@
 
 On floor with obstacles of exact shape, or on a mask of cells, the legs are a shortest path for the robot's
 middle, bends at corners of obstacles included. Where cells have multipliers the turns of the path are left
-out as long as that saves cost. No leg is taken that the exact shapes refuse: then the path over cells stays.
+out and moved as long as that saves cost. No leg is taken that the exact shapes refuse: then the path over cells
+stays.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ Point = tuple[float, float, float]
 _MARGIN = 2e-6  # metres kept from exact shapes: cells are eroded by half of it, and rounding takes far less
 _QUARTER = 8  # segments of a quarter circle around corners: a body of 0.25 m loses a millimetre
 _SAME = 1e-9  # metres
+_APART = 3.0  # cells; between turns that may move
 
 
 class Straight(NamedTuple):
@@ -65,7 +67,7 @@ def turns_of(indices: NDArray[np.int32]) -> NDArray[np.int32]:
 def straighten(
     graph: NavGraph, indices: NDArray[np.int32], begin: Point | None = None, end: Point | None = None
 ) -> Straight:
-    """Replace a path over cells by straight legs, none longer or dearer than what it replaces.
+    """Replace a path over cells by straight legs that cost no more; where all floor costs the same, no longer either.
 
     Parameters
     ----------
@@ -90,6 +92,15 @@ def _without_repeats(points: NDArray[np.float64]) -> NDArray[np.float64]:
     moved = np.hypot(*np.diff(points, axis=0).T) > _SAME
     kept: NDArray[np.float64] = points[np.concatenate([[True], moved])]
     return kept
+
+
+def _divided(points: NDArray[np.float64], most: float) -> NDArray[np.float64]:
+    """Return the points of a polyline, (n, 2), with others between them, so that no leg is longer than that."""
+    parts = [points[:1]]
+    for a, b in pairwise(points):
+        count = math.ceil(math.hypot(*(b - a)) / most)
+        parts.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
+    return np.vstack(parts)
 
 
 def _length(points: NDArray[np.float64]) -> float:
@@ -146,7 +157,7 @@ class _Plane:
             if dearest <= self.least:  # no way costs less
                 length = _length(found[0])
                 return Straight(found[0], length, length * self.least)
-        return self.shortened(points)
+        return self._eased(self.shortened(points))
 
     @cached_property
     def least(self) -> float:
@@ -194,6 +205,17 @@ class _Plane:
         cost = math.fsum(search.along(self.cost, *cells[a], *cells[b]) for a, b in pairwise(kept))
         found = points[kept]
         return Straight(found, _length(found), cost * self.frame.cell_size)
+
+    def _eased(self, path: Straight) -> Straight:
+        """Move the turns of a path to where it costs less, with more turns where floor gets dearer gradually."""
+        cells = self._in_cells(_divided(path.points, _APART * self.frame.cell_size))
+        search.relax(self.cost, cells)
+        kept, cost = search.shorten(self.cost, cells)
+        points = self._in_metres(cells[kept])
+        points[[0, -1]] = path.points[[0, -1]]
+        if cost * self.frame.cell_size >= path.cost or (self.environment and not self._is_clear(points)):
+            return path
+        return Straight(points, _length(points), cost * self.frame.cell_size)
 
     @cached_property
     def _triangles(self) -> NDArray[np.object_]:

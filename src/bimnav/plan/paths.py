@@ -215,7 +215,7 @@ def smooth_path(
 
     Between links, where all floor costs the same, the legs are a shortest path for the robot's middle: past
     the exact shapes of an environment, grown by the robot's radius, or past the blocked cells of a mask, whose
-    sides and corners may be touched. Where cells have multipliers, turns are left out while that saves cost.
+    sides and corners may be touched. Where cells have multipliers, turns are left out and moved while that saves cost.
     Every leg is checked against the exact shapes; where one fails the path over cells stays.
 
     Parameters

@@ -9,7 +9,7 @@ from bimnav.search.mesh import Mesh, mesh_of_mask, mesh_of_triangles
 from bimnav.search.ordering import Ordering, is_small, order_few, order_groups, order_rows
 from bimnav.search.oriented import HEADINGS, find_motion
 from bimnav.search.repair import Field
-from bimnav.search.sight import along, dearest, shorten
+from bimnav.search.sight import along, dearest, relax, shorten
 from bimnav.search.taut import Taut, find_taut
 from bimnav.search.trace import centers
 from bimnav.search.transform import by_clearance, clearances
@@ -41,6 +41,7 @@ __all__ = [
     "order_few",
     "order_groups",
     "order_rows",
+    "relax",
     "share_out",
     "shorten",
     "trace_visits",

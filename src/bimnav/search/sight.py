@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 
 from bimnav.search.compiled import kernel, lean
 
-__all__ = ["along", "dearest", "shorten"]
+__all__ = ["along", "dearest", "relax", "shorten"]
 
 _NEAR = 1e-9  # cells; a line that passes a corner closer than this passes through it
 _AHEAD = 256  # turns that one straight leg may replace
+_SWEEPS = 100  # over all turns, with steps of one length
+_FINEST = 0.125  # cells; the shortest step
+_WAYS = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
 @lean
@@ -126,3 +129,43 @@ def shorten(cost: NDArray[np.float32], points: NDArray[np.float64]) -> tuple[NDA
         found[kept] = at
         at = before[at]
     return found, best[count - 1]
+
+
+@kernel
+def relax(cost: NDArray[np.float32], points: NDArray[np.float64]) -> None:
+    """Move the turns of a path, each by steps that become finer, while its two legs cost less for it.
+
+    Parameters
+    ----------
+    cost : (rows, cols) float32
+        As for `along`.
+    points : (n, 2) float64, changed in place
+        Column and row, in cells; the ends stay. Consecutive points must see each other, and still do.
+    """
+    waits = np.empty(len(points), dtype=np.bool_)
+    step = 1.0
+    while step >= _FINEST:
+        waits[:] = True
+        for _ in range(_SWEEPS):
+            is_still = True
+            for k in range(1, len(points) - 1):
+                if not waits[k]:
+                    continue
+                waits[k] = False
+                ax, ay, bx, by = points[k - 1, 0], points[k - 1, 1], points[k + 1, 0], points[k + 1, 1]
+                x, y = points[k, 0], points[k, 1]
+                least = along(cost, ax, ay, x, y) + along(cost, x, y, bx, by) - _NEAR
+                for right, up in _WAYS:
+                    to_x, to_y = x + step * right, y + step * up
+                    if math.hypot(to_x - ax, to_y - ay) + math.hypot(bx - to_x, by - to_y) >= least:
+                        continue  # no multiplier is below 1
+                    total = along(cost, ax, ay, to_x, to_y)
+                    if total < least:
+                        total += along(cost, to_x, to_y, bx, by)
+                    if total < least:
+                        least, is_still = total, False
+                        points[k, 0], points[k, 1] = to_x, to_y
+                        waits[k - 1 : k + 2] = True
+            if is_still:
+                break
+        step *= 0.5

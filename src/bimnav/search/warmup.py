@@ -12,7 +12,7 @@ from bimnav.search.mesh import mesh_of_mask
 from bimnav.search.ordering import EXACT, order_rows
 from bimnav.search.oriented import find_motion
 from bimnav.search.repair import Field
-from bimnav.search.sight import along, dearest, shorten
+from bimnav.search.sight import along, dearest, relax, shorten
 from bimnav.search.taut import find_taut
 from bimnav.search.trace import centers
 from bimnav.search.transform import by_clearance, clearances
@@ -34,6 +34,7 @@ def warmup() -> None:
     find_taut(mesh, (0.5, 2.5), int(face[2, 0]), (2.5, 0.5), int(face[0, 2]))
     line = np.array([[0.5, 0.5], [2.5, 0.5], [2.5, 2.5]])
     shorten(cost[0], line)
+    relax(cost[0], line)
     along(cost[0], 0.5, 0.5, 2.5, 2.5)
     dearest(cost[0], 0.5, 0.5, 2.5, 2.5)
     for multipliers in (cost, cost + np.arange(3).astype(np.float32)):
