@@ -345,6 +345,28 @@ def any_angle(_: int, tiny: bool) -> Row:
     return Row(what, "published optima", f"{mean:.7f}", "1.010", mean <= 1.01, note)
 
 
+def eased(count: int, tiny: bool) -> Row:
+    """Straight paths over clearance costs, against the path over cells they are drawn from."""
+    rng = np.random.default_rng(0)
+    free = rooms(96 if tiny else 512)
+    graph = bn.NavGraph.from_mask(free).with_clearance(6.0)
+    cells = np.argwhere(graph.components[0] == np.bincount(graph.components.ravel())[1:].argmax() + 1)
+    costs, times = [], []
+    for _ in range(count):
+        start, goal = (bn.Cell(0, *cell) for cell in rng.choice(cells, 2, replace=False).tolist())
+        plain, smooth = bn.find_path(graph, start, goal), bn.find_path(graph, start, goal, smooth="any_angle")
+        costs.append(smooth.cost / plain.cost)
+        found = least(
+            lambda s=start, g=goal: bn.find_path(graph, s, g, smooth="any_angle"),
+            lambda s=start, g=goal: bn.find_path(graph, s, g),
+            rounds=2,
+        )
+        times.append(found[0] / found[1])
+    note = f"worst {max(costs):.3f}; {mean_ratio(times):.1f} times as long as the path over cells takes"
+    what = "straight paths, clearance costs: mean cost"
+    return Row(what, "the path over cells", f"{np.mean(costs):.3f}", "", None, note)
+
+
 def repair(count: int, tiny: bool) -> Row:
     """Closing and opening 3 x 3 cells on a path, against the whole field."""
     rng = np.random.default_rng(1)
@@ -477,8 +499,8 @@ def draw(numbers: Sequence[dict[str, float]]) -> None:
 
 PARTS: dict[str, Callable[[int, bool], Row | list[Row]]] = {
     "uniform": uniform, "lambdas": lambdas, "weighted": weighted, "fields": fields, "matrix": matrix,
-    "building": building, "dilation": dilation, "transform": transform, "any_angle": any_angle, "repair": repair,
-    "memory": memory, "first_plan": first_plan,
+    "building": building, "dilation": dilation, "transform": transform, "any_angle": any_angle, "eased": eased,
+    "repair": repair, "memory": memory, "first_plan": first_plan,
 }  # fmt: skip
 
 
