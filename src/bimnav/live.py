@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from bimnav import search
+from bimnav import _checks, search
 from bimnav.errors import GridError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
@@ -50,7 +50,8 @@ class LiveField:
     """
 
     def __init__(self, graph: NavGraph, sources: Cell | Iterable[Cell]) -> None:
-        self._cells = (sources,) if isinstance(sources, Cell) else tuple(sources)
+        _checks.need("graph", graph, NavGraph)
+        self._cells = (sources,) if isinstance(sources, Cell) else _checks.many("sources", sources)
         self.graph: NavGraph
         self._level: float | None
         self._distance: NDArray[np.float64] | None
@@ -74,6 +75,7 @@ class LiveField:
         StartBlockedError
             If a source is blocked now; the field then stays as it was.
         """
+        _checks.need("graph", graph, NavGraph)
         before = self.graph
         if graph is before:
             return True
