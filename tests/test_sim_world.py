@@ -23,6 +23,7 @@ from bimnav.sim import (
     RobotStatus,
     SimDoor,
     SimResult,
+    SpeedLimit,
     find_passages,
     simulate,
 )
@@ -614,3 +615,44 @@ def test_the_time_of_every_robot_is_spent_once():
         for a, b in pairwise(np.linspace(track.times[0], track.times[-1], 400)):
             moved = math.dist(track.points_at(a).tolist(), track.points_at(b).tolist())
             assert moved <= 1.0 * (b - a) + 1e-9
+
+
+# --- nobody stands for ever
+
+
+@pytest.mark.parametrize("seed", [1, 4, 8, 9])
+def test_a_slow_robot_among_people_looks_again_later_and_not_at_the_same_instant(seed):
+    moments: list[tuple[float, str]] = []
+
+    def listen(row):
+        moments.append((row.time, row.event))
+        assert moments.count(moments[-1]) < 5, "time stands still"
+
+    result = simulate(
+        tour_in(HALL, Cell(0, 5, 0), Cell(0, 5, 30), Cell(0, 8, 3), Cell(0, 1, 20)),
+        robot=Robot("R1", speed=1.5, acceleration=0.5),
+        people=[Person(name) for name in "abc"],
+        speed_limits=[SpeedLimit(shapely.box(-1, 0, 41, 10), 0.3)],
+        rng=np.random.default_rng(seed),
+        on_event=listen,
+    )
+    assert len(result.served) == 3
+
+
+@pytest.mark.parametrize("deep", [0.1, 1.0])
+def test_who_waits_in_vain_for_floor_that_is_thinner_than_a_cell_gives_up(deep):
+    stays = tour_in(CORRIDOR, Cell(0, 0, 0), Cell(0, 0, 20), prefix="a")
+    comes = tour_in(CORRIDOR, Cell(0, 0, 5), Cell(0, 0, 30), prefix="b")
+    part = Passage("sill", shapely.box(20.5 - deep / 2, -1, 20.5 + deep / 2, 2))
+    fleet = [Robot("A", speed=10.0, radius=0.3), Robot("B", speed=1.0, radius=0.3)]
+    result = simulate([stays, comes], robots=fleet, passages=[part], patience=20.0, until=1000.0)
+    (given_up,) = rows(result, "give_up", robot="B")
+    assert given_up.cause == "sill, in use closes the way for 20 s"
+    assert given_up.time < 60
+
+
+def test_a_line_that_meets_an_area_only_by_a_rounding_does_not_cross_it():
+    from bimnav.sim.areas import _inside
+
+    a, b = np.array([0.0, 0.0]), np.array([1.0, 0.0])
+    assert _inside(a, b, shapely.LineString()) == []

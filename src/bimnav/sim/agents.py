@@ -20,7 +20,7 @@ from bimnav.sim.knowledge import Closure
 from bimnav.sim.log import EventKind, new_event
 from bimnav.sim.motion import Motion, drive, rest, stand
 from bimnav.sim.routes import JOINED, Legs, Line, end_of, legs_of
-from bimnav.sim.stretches import Gate, Stretch, gates_of
+from bimnav.sim.stretches import Gate, Stretch, gates_of, joined
 from bimnav.sim.track import RobotStatus, TrackRecorder
 
 if TYPE_CHECKING:
@@ -377,7 +377,7 @@ class RobotAgent:
             if len(stretches) > 1 or self.held or stretches[0].needs:
                 entered = yield from self.enter(stretches[0], errand)
                 if not entered:
-                    errand.leg = _joined(stretches)
+                    errand.leg = joined(stretches)[0]
                     return False
             ahead = 1 if stretches[0].lift is not None else self.world.passable(self, stretches)
             group, stretches = stretches[:ahead], stretches[ahead:]
@@ -387,7 +387,7 @@ class RobotAgent:
             else:
                 done = yield from self.move(group, stretches, errand)
             if not done or (self.orders and stretches):
-                errand.leg = _joined(stretches) if done else self.line
+                errand.leg = joined(stretches)[0] if done else self.line
                 return False
         self.avoided = None
         errand.leg = None
@@ -461,7 +461,7 @@ class RobotAgent:
         self.run_down()
         if not disturbed and not self.orders:
             self.stuck_since = float(self.world.clock.now) - patience
-            self.avoided = Closure(f"{names}, in use", stretch.area, stretch.storey)
+            self.avoided = Closure(f"{names}, in use", stretch.area, stretch.storey, is_held=True)
         return False
 
     def halt(self, status: RobotStatus, event: EventKind, errand: Errand, cause: str) -> None:
@@ -491,19 +491,19 @@ class RobotAgent:
 
     def move(self, group: list[Stretch], after: list[Stretch], errand: Errand) -> Step:
         """Drive stretches in one go, and stop for what comes in the way; answer whether their end was reached."""
-        line = _joined(group)
+        line, limits = joined(group)
         motion = drive(
             line.points,
             line.storeys,
             self.robot,
             speed=self.cruise,
             heading=self.heading,
-            limits=_limits_of(group),
+            limits=limits,
         )
         gates = deque(gates_of(group, motion, self.robot.acceleration))
         begin, passed = float(self.world.clock.now), 0.0
         self.under_way = begin, motion
-        self.line = _joined([*group, *after]) if gates or self.world.is_eventful else None
+        self.line = joined([*group, *after])[0] if gates or self.world.is_eventful else None
         is_looking = True
         while True:
             if is_looking:
@@ -596,8 +596,9 @@ class RobotAgent:
         """Stand until somebody has passed, or patience is over."""
         name, begun = walker.person.name, float(self.world.clock.now)
         self.halt(RobotStatus.WAITING, "wait", errand, f"{name} crosses the way")
-        line = self.line
-        while line is not None and not self.world.is_clear(self, line, walker, _AHEAD):
+        line, is_stuck = self.line, self.driven <= JOINED  # one that could not set off looks again a little later
+        while line is not None and (is_stuck or not self.world.is_clear(self, line, walker, _AHEAD)):
+            is_stuck = False
             if (yield from self.pause(self.world.pass_time(min(_GLANCE, self.battery.lasts(self.status))))):
                 return
             self.run_down()
@@ -811,23 +812,6 @@ def _heading(points: NDArray[np.float64]) -> float | None:
         if math.hypot(dx, dy) > JOINED:
             return math.atan2(dy, dx)
     return None
-
-
-def _joined(stretches: list[Stretch]) -> Line:
-    """Put stretches together again."""
-    if len(stretches) == 1:
-        return Line(stretches[0].points, stretches[0].storeys)
-    points = [stretches[0].points, *(stretch.points[1:] for stretch in stretches[1:])]
-    storeys = [stretches[0].storeys, *(stretch.storeys[1:] for stretch in stretches[1:])]
-    return Line(np.concatenate(points), np.concatenate(storeys))
-
-
-def _limits_of(group: list[Stretch]) -> tuple[float, ...] | None:
-    """Return the speed limit of every piece of some stretches; None if none has one."""
-    if all(stretch.limits is None for stretch in group):
-        return None
-    parts = [stretch.limits or (math.inf,) * (len(stretch.points) - 1) for stretch in group]
-    return tuple(limit for part in parts for limit in part)
 
 
 def _held_at(group: list[Stretch], driven: float) -> frozenset[str]:

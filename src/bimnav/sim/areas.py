@@ -132,7 +132,7 @@ def _inside(a: NDArray[np.float64], b: NDArray[np.float64], part: BaseGeometry) 
     """Return the shares of a piece from a to b that an intersection with it covers."""
     way = b - a
     square = float(way @ way)
-    if square == 0:
+    if square == 0 or part.is_empty:  # lines and polygons that meet by a rounding share nothing
         return []
     shares = []
     for piece in shapely.get_parts(part).tolist():

@@ -38,12 +38,15 @@ class Closure:
         Plan view, metres; not yet grown by a robot's radius.
     door
         The door that does not open, if it is one; robots for which it opens may pass.
+    is_held
+        Whether others use it: its polygon is where the middle of a robot cannot be, and one in front of it waits.
     """
 
     name: str
     polygon: BaseGeometry
     storey: int
     door: SimDoor | None = None
+    is_held: bool = False
 
     def stops(self, robot: Robot) -> bool:
         """Tell whether it is closed to a robot."""
@@ -51,7 +54,7 @@ class Closure:
 
     def body(self, robot: Robot) -> BaseGeometry:
         """Return where the middle of a robot cannot be; a doorway was grown already."""
-        return self.polygon if self.door is not None else grown(self.polygon, robot.radius)
+        return self.polygon if self.door is not None or self.is_held else grown(self.polygon, robot.radius)
 
 
 @dataclass(slots=True)
@@ -104,20 +107,10 @@ class Knowledge:
                 continue
             body = closure.body(robot).buffer(-_TOUCH)
             line = shapely.LineString(points[:, :2]) if len(points) > 1 else shapely.Point(points[0, :2])
-            if shapely.intersects(line, body) and self._stops_at(points, storeys, closure.storey, body):
+            leeway = 0.0 if closure.is_held else self.leeway
+            if shapely.intersects(line, body) and _stops_at(points, storeys, closure.storey, body, leeway):
                 return closure
         return None
-
-    def _stops_at(
-        self, points: NDArray[np.float64], storeys: NDArray[np.int32], storey: int, body: BaseGeometry
-    ) -> bool:
-        """Tell whether a line meets a polygon on a storey, but for a short way out of it at the begin."""
-        found = crossings(points, storeys, [(body, storey)])
-        here = shapely.Point(points[0, :2])
-        if found and found[0].begin == 0 and body.covers(here):
-            way_out = float(body.boundary.distance(here))
-            return len(found) > 1 or found[0].end > 2 * way_out + self.leeway
-        return bool(found) or (len(points) == 1 and bool(body.covers(here)))
 
     def graph_for(self, graph: NavGraph, robot: Robot, besides: Closure | None = None) -> NavGraph:
         """Return the graph of a robot with everything closed that it knows of."""
@@ -135,3 +128,15 @@ class Knowledge:
             ]
             self._graphs[key] = graph.block(closed)
         return self._graphs[key]
+
+
+def _stops_at(
+    points: NDArray[np.float64], storeys: NDArray[np.int32], storey: int, body: BaseGeometry, leeway: float
+) -> bool:
+    """Tell whether a line meets a polygon on a storey, but for a short way out of it at the begin."""
+    found = crossings(points, storeys, [(body, storey)])
+    here = shapely.Point(points[0, :2])
+    if found and found[0].begin == 0 and body.covers(here):
+        way_out = float(body.boundary.distance(here))
+        return len(found) > 1 or found[0].end > 2 * way_out + leeway
+    return bool(found) or (len(points) == 1 and bool(body.covers(here)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,7 +21,7 @@ from bimnav.sim.routes import JOINED, Line
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Gate", "Stretch", "cut", "gates_of"]
+__all__ = ["Gate", "Stretch", "cut", "gates_of", "joined"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,6 +135,19 @@ def cut(
             )
         )
     return stretches
+
+
+def joined(stretches: Sequence[Stretch]) -> tuple[Line, tuple[float, ...] | None]:
+    """Put stretches together again; return the speed limit of every piece, too, None if none has one."""
+    if len(stretches) == 1:
+        return Line(stretches[0].points, stretches[0].storeys), stretches[0].limits
+    points = [stretches[0].points, *(stretch.points[1:] for stretch in stretches[1:])]
+    storeys = [stretches[0].storeys, *(stretch.storeys[1:] for stretch in stretches[1:])]
+    line = Line(np.concatenate(points), np.concatenate(storeys))
+    if all(stretch.limits is None for stretch in stretches):
+        return line, None
+    parts = [stretch.limits or (math.inf,) * (len(stretch.points) - 1) for stretch in stretches]
+    return line, tuple(limit for part in parts for limit in part)
 
 
 def name_of(area: SimDoor | Passage) -> str:

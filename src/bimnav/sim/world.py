@@ -29,7 +29,7 @@ from bimnav.sim.log import Event, EventKind
 from bimnav.sim.motion import Motion, drive
 from bimnav.sim.people import Walker, first_meeting
 from bimnav.sim.routes import JOINED, Line, cell_near, end_of, way_between
-from bimnav.sim.stretches import Stretch, cut
+from bimnav.sim.stretches import Stretch, cut, joined
 from bimnav.sim.track import RobotStatus
 from bimnav.stops import Stop, Unreached
 
@@ -379,7 +379,8 @@ class World:
 
     def is_clear(self, agent: RobotAgent, line: Line, walker: Walker, seconds: float) -> bool:
         """Tell whether a robot that goes on now drives for some seconds before it has to stop for somebody."""
-        motion = drive(line.points, line.storeys, agent.robot, speed=agent.cruise, heading=agent.heading)
+        line, limits = joined(self.stretches(agent, line)) if self.setting.limits else (line, None)
+        motion = drive(line.points, line.storeys, agent.robot, speed=agent.cruise, heading=agent.heading, limits=limits)
         moment = self._stop_for(agent, motion, float(self.clock.now), 0.0, walker)
         return moment is None or moment > seconds
 
