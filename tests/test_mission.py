@@ -196,12 +196,15 @@ def test_a_job_does_not_begin_in_a_pocket_between_things():
 
 def test_a_mission_ends_where_it_is_told_along_straight_legs_that_keep_away(flat):
     plain = bn.run(flat, cell_size=FOOT / 2)
-    x, y, _ = plain.start.point
+    x, y = plain.start.point[0] + 0.03, plain.start.point[1] - 0.02  # no middle of a cell
     mission = bn.run(flat, cell_size=FOOT / 2, end=(x, y), smooth="any_angle", clearance=0.3, objective="time")
     assert mission.is_complete
     assert mission.check.ok
     assert mission.tour.end == mission.graph.frame.cell_at(x, y)
-    assert mission.result.state_at(mission.result.makespan).x == pytest.approx(mission.tour.end_point[0])
+    assert mission.tour.end_point[:2] == (x, y)
+    at = mission.result.state_at(mission.result.makespan)
+    assert (at.x, at.y) == pytest.approx((x, y))
+    assert bn.run(flat, cell_size=FOOT / 2, end=(x, y)).tour.route[-1][-1][:2].tolist() == [x, y]
     assert all(leg.legs is not None for leg in mission.tour.legs)
     assert mission.graph.clearances == ((0.3, 4.0),)
     assert mission.graph.objective == "time"

@@ -266,3 +266,11 @@ def test_published_paths_are_matched(name, full):
             assert_valid_path(path)
         # printed with six digits, in bg512 with two decimals
         assert abs(path.length - length) <= (0.006 if name.startswith("bg512") else max(6e-6 * length, 1e-6))
+
+
+def test_a_matrix_tells_how_far_it_is():
+    graph, told = bn.NavGraph.from_mask(np.ones((3, 3), dtype=bool)), []
+    cells = [Cell(0, 0, 0), Cell(0, 1, 1), Cell(0, 2, 0)]
+    matrix = bn.distance_matrix(graph, cells, progress=lambda *beat: told.append(beat))
+    assert told == [(0, 3, "rows"), (1, 3, "rows"), (2, 3, "rows"), (3, 3, "rows")]
+    assert np.array_equal(matrix, bn.distance_matrix(graph, cells))

@@ -160,3 +160,11 @@ def test_a_replanned_path_costs_what_a_new_one_does(seed):
         assert found.path.graph.cost is not None
         assert found.path.cost == pytest.approx(new.cost)
         assert all(graph.free[cell] for cell in found.path.cells)
+
+
+def test_a_replanner_shows_where_it_leads():
+    graph = bn.NavGraph.from_mask(np.ones((1, 4), dtype=bool))
+    robot = bn.Replanner(graph, bn.Cell(0, 0, 0), bn.Cell(0, 0, 3))
+    assert repr(robot) == f"Replanner({bn.Cell(0, 0, 0)} to {bn.Cell(0, 0, 3)}, 4 cells, 3.000 m)"
+    robot.update(graph.block([bn.Cell(0, 0, 2)]))
+    assert repr(robot).endswith("no route now)")

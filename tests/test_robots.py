@@ -239,8 +239,9 @@ def test_the_schema_of_robot_files_takes_what_is_taken_and_refuses_what_is_refus
         load_robot(write(text))
 
 
-def test_a_name_that_is_nearly_a_profile_is_taken_with_a_warning(capsys):
-    assert main(["run", str(bn.sample("apartment")), "--robot", "scruber", "--json"]) == 0
+@pytest.mark.parametrize(("wrong", "meant"), [("scruber", "scrubber"), ("cleanerr", "small_cleaner")])
+def test_a_name_that_is_nearly_a_profile_is_taken_with_a_warning(capsys, wrong, meant):
+    assert main(["run", str(bn.sample("apartment")), "--robot", wrong, "--json"]) == 0
     captured = capsys.readouterr()
-    assert "did you mean 'scrubber'" in captured.err
-    assert '"name": "scruber"' in captured.out
+    assert f"did you mean {meant!r}" in captured.err
+    assert f'"name": "{wrong}"' in captured.out

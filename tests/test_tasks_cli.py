@@ -1,6 +1,7 @@
 """`bimnav tasks`: list, schema, check, show."""
 
 import json
+import re
 
 import pytest
 
@@ -59,8 +60,7 @@ def test_with_a_model_it_counts_what_each_rule_picks_and_warns_of_empty_ones(tmp
     assert main(["tasks", "check", path, apartment]) == 0
     out = capsys.readouterr().out
     assert "furniture" in out
-    assert "warning: rule 'IfcSpace'" in out
-    assert "picks nothing. Its filter 'IfcSpace' alone picks" in out
+    assert re.search("warning: nothing; its filter alone picks [1-9]", out)
     assert main(["tasks", "check", path, apartment, "--json"]) == 0
     rules = json.loads(capsys.readouterr().out)["rules"]["look"]
     assert [rule["kind"] for rule in rules] == ["targets", "targets", "restricted"]

@@ -7,6 +7,8 @@ import sys
 import time
 from collections.abc import Callable
 
+from bimnav import _checks
+
 __all__ = ["Display", "Progress"]
 
 _PATIENCE = 2.0  # seconds before progress shows by itself
@@ -28,6 +30,8 @@ class Display:
     """Shows how far a job is: on standard error, or through the caller's function."""
 
     def __init__(self, name: str, wanted: bool | Progress | None) -> None:
+        if not isinstance(wanted, bool):
+            _checks.function("progress", wanted)
         self._name = name
         self._call = wanted if callable(wanted) else None
         self._shows = _is_watched() if wanted is None else wanted is True

@@ -22,7 +22,7 @@ __all__ = ["Start", "find_end", "find_start"]
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where a job begins: cell, exact point in metres, and why there."""
+    """Where a job begins, or ends: cell, exact point in metres, and why there."""
 
     cell: Cell
     point: tuple[float, float, float]
@@ -78,15 +78,15 @@ def find_start(graph: NavGraph, place: Place | None = None) -> Start:
     return next(inside, Start(anywhere, graph.frame.center_of(anywhere), f"on {environment.storeys[storey].name}"))
 
 
-def find_end(graph: NavGraph, place: Place) -> Cell:
-    """Return the cell of a place at which a job ends.
+def find_end(graph: NavGraph, place: Place) -> Start:
+    """Return the cell and the exact point of a place at which a job ends.
 
     Raises
     ------
     OutsideMapError, GoalBlockedError
         As for a start.
     """
-    return _place_at(graph, place, "end").cell
+    return _place_at(graph, place, "end")
 
 
 def _middle_of(graph: NavGraph, region: Region, part: int) -> Start | None:

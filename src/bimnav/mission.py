@@ -103,8 +103,8 @@ def run(
     return_to_start
         Whether the robot goes back in the end.
     end
-        `(x, y)` or `(x, y, storey)` in metres: where the robot goes behind its last stop, to the middle of
-        that cell; None for nowhere.
+        `(x, y)` or `(x, y, storey)` in metres: where the robot goes behind its last stop; None for
+        nowhere.
     objective
         What paths make least, `distance`, `time` or `energy`; None for what the task says.
     clearance
@@ -167,7 +167,13 @@ def run(
     begin = find_start(graph, start)
     last = None if end is None else find_end(graph, end)
     tour = plan_tour(
-        graph, begin.cell, start_point=begin.point, return_to_start=return_to_start, end=last, smooth=smooth
+        graph,
+        begin.cell,
+        start_point=begin.point,
+        return_to_start=return_to_start,
+        end=None if last is None else last.cell,
+        end_point=None if last is None else last.point,
+        smooth=smooth,
     )
     refuse_lost(tour, lost)
     tour, check = _checked(tour, smooth)
@@ -205,6 +211,7 @@ def _checked(tour: Tour, smooth: Smooth | None) -> tuple[Tour, Check]:
             start_point=tour.start_point,
             return_to_start=tour.return_to_start,
             end=tour.end,
+            end_point=tour.end_at,
             smooth=smooth,
         )
         check = check_plan(tour)

@@ -89,6 +89,10 @@ class Replanner:
         self.path: Path | None = find_path(graph, start, goal)
         self._topology: Topology | None = None if graph.environment is None else topology(graph)
 
+    def __repr__(self) -> str:
+        way = "no route now" if self.path is None else f"{len(self.path.indices)} cells, {self.path.length:.3f} m"
+        return f"Replanner({self.at} to {self.goal}, {way})"
+
     def update(self, graph: NavGraph, at: Cell | None = None) -> Replan:
         """Take over a changed world, and find out what it means for the route.
 

@@ -126,7 +126,7 @@ def _robot(options: argparse.Namespace) -> bn.Robot:
     from bimnav.robots import list_robots, robot_named
 
     known = [profile.name for profile in list_robots()]
-    near = difflib.get_close_matches(options.robot, known, 1, cutoff=0.8)
+    near = difflib.get_close_matches(options.robot, known, 1)
     if near and options.robot not in known:
         warn(f"robot {options.robot!r} is no profile, and so a plain robot of that name; did you mean {near[0]!r}?")
     said = {name: getattr(options, name) for name in ("radius", "height", "speed")}

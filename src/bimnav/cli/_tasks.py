@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from bimnav.cli._shared import BAD_INPUT, DONE, show, show_json
 
 if TYPE_CHECKING:
-    from bimnav.building import Building
+    from bimnav.building import Building, Issue
     from bimnav.cli._shared import Commands
-    from bimnav.tasks import FileCheck, RuleCheck, Task
+    from bimnav.tasks import FileCheck, Rule, RuleCheck, Task
 
 _EXAMPLES = """\
 examples:
@@ -162,7 +162,17 @@ def _told(check: RuleCheck, most: int) -> Iterable[str]:
     if len(check.found) > most:
         yield f"      and {len(check.found) - most} more"
     for note in check.notes:
-        yield f"    {note.severity}: {note.message} {note.hint}".rstrip()
+        if note.code == "empty-rule":
+            yield f"    {note.severity}: nothing; its filter alone picks {check.filtered}"
+        else:
+            yield f"    {note.severity}: {_said(note, rule)} {note.hint}".rstrip()
+
+
+def _said(note: Issue, rule: Rule) -> str:
+    """Return what a note says of a rule, without rule and filter, which stand above."""
+    from bimnav.tasks import told
+
+    return note.message.removeprefix(f"{told(rule)}: ").removeprefix(f"filter {rule.filter!r} ")
 
 
 def _reason(why: str) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bimnav import _checks, search
+from bimnav._progress import Display, Progress
 from bimnav._why import why_unreachable
 from bimnav.errors import (
     GoalBlockedError,
@@ -282,7 +283,9 @@ def source_indexes(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[n
     return np.array([free_index(graph, cell, "start") for cell in cells])
 
 
-def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float64]:
+def distance_matrix(
+    graph: NavGraph, cells: Sequence[Cell], *, progress: bool | Progress | None = None
+) -> NDArray[np.float64]:
     """Find the distances between all pairs of cells.
 
     Parameters
@@ -291,6 +294,9 @@ def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float6
         Graph to search.
     cells
         May repeat, and may be blocked.
+    progress
+        As in `read_ifc`: whether to show how far it is, or a function to call with rows done, their total,
+        and a word.
 
     Returns
     -------
@@ -308,7 +314,9 @@ def distance_matrix(graph: NavGraph, cells: Sequence[Cell]) -> NDArray[np.float6
     np.fill_diagonal(matrix, 0.0)
     free = np.flatnonzero(np.isfinite(graph.cost.ravel()[index]))
     scale = graph.frame.cell_size * graph.unit_cost
-    matrix[np.ix_(free, free)] = search.distances_between(layout_of(graph), index[free], scale)
+    with Display("distances", progress) as report:
+        matrix[np.ix_(free, free)] = search.distances_between(layout_of(graph), index[free], scale, report)
+        report(len(free), len(free), "rows")
     return matrix
 
 

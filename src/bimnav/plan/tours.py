@@ -69,6 +69,8 @@ class Tour:
         Whether the tour ends where it begins.
     end
         Cell in which the tour ends, behind its last stop; None if it ends there, or at the start.
+    end_at
+        World point in that cell at which it ends, metres; None for the middle.
     charges
         Visits to chargers, which are among the stops, and what they cost.
     """
@@ -83,6 +85,7 @@ class Tour:
     lower_bound: float
     return_to_start: bool = False
     end: Cell | None = None
+    end_at: Point | None = None
     charges: tuple[Charge, ...] = ()
 
     def __repr__(self) -> str:
@@ -128,7 +131,7 @@ class Tour:
     def end_point(self) -> Point:
         """World point at which the tour ends, metres."""
         if self.end is not None:
-            return self.graph.frame.center_of(self.end)
+            return self.graph.frame.center_of(self.end) if self.end_at is None else self.end_at
         if self.return_to_start or not self.stops:
             return self.start_point
         return self.stops[-1].end
@@ -162,6 +165,7 @@ def plan_tour(
     return_to_start: bool = False,
     end: Cell | None = None,
     start_point: Point | None = None,
+    end_point: Point | None = None,
     robot: Robot | None = None,
     chargers: Iterable[Stop] | None = None,
 ) -> Tour:
@@ -189,8 +193,9 @@ def plan_tour(
         Whether to come back in the end.
     end
         Cell in which the tour ends; None for any.
-    start_point
-        World point at which the robot is, in metres; the middle of its cell if not given.
+    start_point, end_point
+        World points at which the robot is, and at which the tour ends, in metres; the middles of their cells if
+        not given.
     robot
         Its speed says what can be done when, its battery how far it gets. The default is the one the
         environment was made for.
@@ -210,7 +215,7 @@ def plan_tour(
     NoPathError
         If no path leads from the start to the end.
     InputError
-        If the tour should both end elsewhere and return.
+        If the tour should both end elsewhere and return, or has a point to end at and no cell.
     """
     _checks.need("graph", graph, NavGraph)
     _checks.need("robot", robot, Robot, or_none=True)
@@ -219,6 +224,9 @@ def plan_tour(
     check_smooth(smooth)
     free_index(graph, start, "start")
     start_point = None if start_point is None else _checks.point("start_point", start_point)
+    end_point = None if end_point is None else _checks.point("end_point", end_point)
+    if end is None and end_point is not None:
+        raise InputError("a tour has an end_point and no end.", "Give its cell, too: graph.frame.cell_at(x, y).")
     if end is not None:
         if return_to_start and end != start:
             raise InputError("a tour cannot both end elsewhere and return.", "Give end or return_to_start, not both.")
@@ -257,6 +265,7 @@ def plan_tour(
         ordered.bound,
         return_to_start,
         end,
+        end_point,
     )
     return _driven(planned, robot, chargers, algorithm, smooth)
 
@@ -279,7 +288,7 @@ def _driven(
         cells.append(goal)
     legs = tuple(find_path(graph, a, b, algorithm=algorithm) for a, b in pairwise(cells))
     if smooth:
-        ends = [tour.start_point, *(None if stop.approach == "reach" else stop.end for stop in visits), None]
+        ends = [tour.start_point, *(None if stop.approach == "reach" else stop.end for stop in visits), tour.end_at]
         legs = tuple(smooth_path(leg, ends[k], ends[k + 1]) for k, leg in enumerate(legs))
     is_optimal = tour.is_optimal and not charges
     return replace(tour, stops=visits, legs=legs, unreached=tuple(unreached), is_optimal=is_optimal, charges=charges)

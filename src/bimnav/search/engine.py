@@ -74,12 +74,16 @@ def distances(layout: Layout, sources: NDArray[np.int64], scale: float) -> NDArr
     return lengths.reshape(-1, layout.height, layout.stride)[:, 1:-1, 1:-1] * scale
 
 
-def distances_between(layout: Layout, cells: NDArray[np.int64], scale: float) -> NDArray[np.float64]:
-    """Return the (n, n) costs between free cells, in cells times a scale; row to column."""
+def distances_between(
+    layout: Layout, cells: NDArray[np.int64], scale: float, report: Callable[[int, int, str], None] | None = None
+) -> NDArray[np.float64]:
+    """Return the (n, n) costs between free cells, in cells times a scale; row to column. Every row is reported."""
     space = workspace()
     cells = layout.padded(cells)
     matrix = np.zeros((len(cells), len(cells)))
     for k, cell in enumerate(cells):
+        if report is not None:
+            report(k, len(cells), "rows")
         ends = slice(k + 1, None) if layout.is_symmetric else slice(None)
         targets = cells[ends]
         if not len(targets):

@@ -131,7 +131,10 @@ def _check_gaps(begins: NDArray[np.float64], ends: NDArray[np.float64], places: 
 def end_of(tour: Tour) -> tuple[Cell, tuple[float, float, float]]:
     """Return the cell and the world point to which a tour leads behind its last stop."""
     end = getattr(tour, "end", None)
-    return (tour.start, tour.start_point) if end is None else (end, tour.graph.frame.center_of(end))
+    if end is None:
+        return tour.start, tour.start_point
+    at = getattr(tour, "end_at", None)
+    return end, tour.graph.frame.center_of(end) if at is None else at
 
 
 def _storeys_along(leg: NDArray[np.float64], frame: GridFrame, before: int, after: int) -> NDArray[np.int32]:

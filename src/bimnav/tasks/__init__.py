@@ -4,7 +4,7 @@ from bimnav.tasks._check import RuleCheck, check_rules
 from bimnav.tasks._choose import Choice, Overruled, choose
 from bimnav.tasks._files import FileCheck, TaskInfo, check_file, entourage, list_tasks, load_task, task_schema
 from bimnav.tasks._lint import lint_rules
-from bimnav.tasks._match import Match, match, rules_for
+from bimnav.tasks._match import Match, match, rules_for, told
 from bimnav.tasks._task import Destination, Rule, Standoff, Task
 
 __all__ = [
@@ -28,4 +28,5 @@ __all__ = [
     "match",
     "rules_for",
     "task_schema",
+    "told",
 ]

@@ -97,7 +97,8 @@ def _tears(tour: Tour, route: Sequence[NDArray[np.float64]]) -> Iterator[Violati
     ends = [stop.end for stop in tour.stops]
     last = getattr(tour, "end", None)
     if last is not None:
-        ends.append(tour.graph.frame.center_of(last))
+        at = getattr(tour, "end_at", None)
+        ends.append(tour.graph.frame.center_of(last) if at is None else at)
     elif tour.return_to_start and (ends or route):
         ends.append(tour.start_point)
     if len(route) != len(ends):
