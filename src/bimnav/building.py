@@ -5,18 +5,19 @@ Everything after this module works on a `Building` written by hand as well as on
 
 from __future__ import annotations
 
-import hashlib
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from bimnav import _checks
-from bimnav.errors import GeometryError, ModelError, ValueRangeError
+from bimnav._identity import global_id_of as global_id_of
+from bimnav._shapes import Mesh, Shape, bounds_of
+from bimnav.detections import Detection
+from bimnav.errors import ModelError, ValueRangeError
 
 if TYPE_CHECKING:
     from bimnav._connectors import Ascent
@@ -41,108 +42,6 @@ __all__ = [
     "Space",
     "Storey",
 ]
-
-_TOGETHER = 100_000  # vertices of copies that are worked on at once
-_FARTHEST = 1e8  # metres from the origin; beyond it float64 no longer holds a tenth of a micrometre
-
-
-def _frozen(values: ArrayLike, dtype: type[np.generic], columns: int, what: str) -> NDArray[Any]:
-    array = np.array(values, dtype=dtype)  # a private copy
-    if array.size == 0:
-        array = array.reshape(0, columns)
-    if array.ndim != 2 or array.shape[1] != columns:
-        raise GeometryError(f"{what} have shape {array.shape}.", f"Give an array of shape (n, {columns}).")
-    array.flags.writeable = False
-    return array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Mesh:
-    """Triangles in coordinates of their own; shared by every shape that repeats them.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64, metres
-    faces : (m, 3) int32, indexes into `vertices`; outward faces run counter-clockwise
-    quality
-        How the mesh came about: `exact` (closed as given), `repaired` (closed after welding),
-        `surface` (open: treated as a set of sheets) or `hull`.
-    """
-
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int32]
-    quality: str = "exact"
-
-    def __post_init__(self) -> None:
-        vertices = _frozen(self.vertices, np.float64, 3, "vertices")
-        faces = _frozen(self.faces, np.int32, 3, "faces")
-        if not np.isfinite(vertices).all() or (vertices.size and float(np.abs(vertices).max()) > _FARTHEST):
-            raise GeometryError("a mesh has vertices that are not finite or are out of range.")
-        if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(vertices)):
-            raise GeometryError(f"a mesh of {len(vertices)} vertices has faces that refer to others.")
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "faces", faces)
-
-    def __reduce__(self) -> tuple[type[Self], tuple[NDArray[np.float64], NDArray[np.int32], str]]:
-        return type(self), (self.vertices, self.faces, self.quality)  # unpickled arrays are read-only as well
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shape:
-    """A mesh put in its place.
-
-    Parameters
-    ----------
-    mesh
-        The triangles.
-    placement : (4, 4) float64
-        From mesh to world coordinates.
-    """
-
-    mesh: Mesh
-    placement: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
-    bounds: NDArray[np.float64] = field(init=False)  # (2, 3) lowest and highest world coordinates
-
-    def __post_init__(self) -> None:
-        placement = np.array(self.placement, dtype=np.float64)
-        if placement.shape != (4, 4) or not np.isfinite(placement).all():
-            raise GeometryError("a placement is not a finite (4, 4) matrix.")
-        placement.flags.writeable = False
-        object.__setattr__(self, "placement", placement)
-        points = self.world_vertices()
-        bounds = np.array([points.min(axis=0), points.max(axis=0)]) if len(points) else np.full((2, 3), np.nan)
-        bounds.flags.writeable = False
-        object.__setattr__(self, "bounds", bounds)
-
-    @classmethod
-    def copies(cls, mesh: Mesh, placements: NDArray[np.float64]) -> list[Self]:
-        """Put a mesh in many places, (n, 4, 4): the same as one shape after the other, many times faster."""
-        placements = np.array(placements, dtype=np.float64)
-        if placements.shape[1:] != (4, 4) or not np.isfinite(placements).all():
-            raise GeometryError("a placement is not a finite (4, 4) matrix.")
-        bounds = np.full((len(placements), 2, 3), np.nan)
-        together = max(1, _TOGETHER // max(1, len(mesh.vertices)))
-        for k in range(0, len(placements) if len(mesh.vertices) else 0, together):
-            some = placements[k : k + together]
-            points = mesh.vertices @ some[:, :3, :3].transpose(0, 2, 1) + some[:, None, :3, 3]
-            bounds[k : k + together, 0], bounds[k : k + together, 1] = points.min(axis=1), points.max(axis=1)
-        placements.flags.writeable = bounds.flags.writeable = False
-        shapes = []
-        for placement, box in zip(placements, bounds, strict=True):
-            shape = object.__new__(cls)
-            object.__setattr__(shape, "mesh", mesh)
-            object.__setattr__(shape, "placement", placement)
-            object.__setattr__(shape, "bounds", box)
-            shapes.append(shape)
-        return shapes
-
-    def __reduce__(self) -> tuple[type[Self], tuple[Mesh, NDArray[np.float64]]]:
-        return type(self), (self.mesh, self.placement)
-
-    def world_vertices(self) -> NDArray[np.float64]:
-        """Return the vertices in world coordinates, (n, 3) metres."""
-        points: NDArray[np.float64] = self.mesh.vertices @ self.placement[:3, :3].T + self.placement[:3, 3]
-        return points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,14 +83,7 @@ class Element:
     @property
     def bounds(self) -> NDArray[np.float64] | None:
         """Lowest and highest world coordinates, (2, 3) metres; None without geometry."""
-        return _bounds_of(self.shapes)
-
-
-def _bounds_of(shapes: Sequence[Shape]) -> NDArray[np.float64] | None:
-    boxes = [shape.bounds for shape in shapes if not np.isnan(shape.bounds).any()]
-    if not boxes:
-        return None
-    return np.array([np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)])
+        return bounds_of(self.shapes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -236,7 +128,7 @@ class Space:
     @property
     def bounds(self) -> NDArray[np.float64] | None:
         """Lowest and highest world coordinates, (2, 3) metres; None without geometry."""
-        return _bounds_of(self.shapes)
+        return bounds_of(self.shapes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -259,7 +151,7 @@ class Opening:
     @property
     def bounds(self) -> NDArray[np.float64] | None:
         """Lowest and highest world coordinates, (2, 3) metres; None without geometry."""
-        return _bounds_of(self.shapes)
+        return bounds_of(self.shapes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -384,66 +276,6 @@ class Ledger:
 
 
 @dataclass(frozen=True, slots=True)
-class Detection:
-    """A target placed by the user, a camera or a digital twin.
-
-    Parameters
-    ----------
-    name
-        As given.
-    x, y
-        World point in metres.
-    storey
-        Name, GlobalId or index of a storey; None if `z` tells, or the job does.
-    z
-        World height in metres, or None.
-    size
-        Width and depth in metres, or None if unknown.
-    ifc_class
-        What was seen, as an IFC class.
-    """
-
-    name: str
-    x: float
-    y: float
-    storey: str | int | None = None
-    z: float | None = None
-    size: tuple[float, float] | None = None
-    ifc_class: str = "IfcBuildingElementProxy"
-
-    def __post_init__(self) -> None:
-        try:
-            self.name.encode()
-            object.__setattr__(self, "x", float(self.x))
-            object.__setattr__(self, "y", float(self.y))
-        except (AttributeError, TypeError, ValueError) as error:  # of what is no text, in no encoding, no number
-            raise ValueRangeError(
-                f"target {self.name!r:.80} at ({self.x!r:.40}, {self.y!r:.40}) cannot be read.",
-                "Give a name in UTF-8, then x and y in metres.",
-            ) from error
-        _checks.fields(self, numbers="z")
-        numbers = {"x": self.x, "y": self.y}
-        if self.z is not None:
-            numbers["z"] = self.z
-        for what, value in numbers.items():
-            if not math.isfinite(value) or abs(value) > _FARTHEST:
-                raise ValueRangeError(
-                    f"target {self.name!r}: {what} is {value}.",
-                    "Give world coordinates of the model in metres.",
-                    {"name": self.name, what: value},
-                )
-        size = np.zeros(2) if self.size is None else _checks.numbers("size", self.size)
-        if size.shape != (2,) or not ((size >= 0) & (size <= 1e3)).all():
-            raise ValueRangeError(f"target {self.name!r}: size is {self.size}.", "Give two lengths from 0 to 1000 m.")
-
-    @property
-    def global_id(self) -> str:
-        """A GlobalId derived from name and position: the same target has the same id in every run."""
-        text = f"{self.name}\0{self.x!r}\0{self.y!r}\0{self.storey!r}\0{self.z!r}"
-        return global_id_of(text)
-
-
-@dataclass(frozen=True, slots=True)
 class Classification:
     """What a product is in a classification system.
 
@@ -482,24 +314,6 @@ class Facts:
     type_properties: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     classifications: tuple[Classification, ...] = ()
     systems: tuple[str, ...] = ()
-
-
-_GLOBAL_ID_DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
-
-
-def global_id_of(text: str) -> str:
-    """Derive a GlobalId from a text: the same text has the same id in every run."""
-    return _compressed(hashlib.sha256(text.encode()).digest()[:16])
-
-
-def _compressed(sixteen_bytes: bytes) -> str:
-    """Write 128 bits as the 22 characters of an IFC GlobalId."""
-    number = int.from_bytes(sixteen_bytes, "big")
-    digits = []
-    for _ in range(22):
-        number, digit = divmod(number, 64)
-        digits.append(_GLOBAL_ID_DIGITS[digit])
-    return "".join(reversed(digits))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Targets from outside the model: files of detections from users, cameras and digital twins."""
+"""Targets from outside the model: what users, cameras and digital twins have seen, and files of it."""
 
 from __future__ import annotations
 
@@ -8,19 +8,83 @@ import json
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bimnav import _checks
-from bimnav.building import Detection
-from bimnav.errors import FileKindError, FileMissingError, InputError
+from bimnav._identity import global_id_of
+from bimnav.errors import FileKindError, FileMissingError, InputError, ValueRangeError
 
-__all__ = ["parse_length", "parse_place", "parse_target", "read_targets"]
+__all__ = ["Detection", "parse_length", "parse_place", "parse_target", "read_targets"]
 
+_FARTHEST = 1e8  # metres from the origin; beyond it float64 no longer holds a tenth of a micrometre
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LENGTH = re.compile(rf"\s*({_NUMBER})\s*(m|cm|mm|ft|in)?\s*")
 _COLUMNS = ("name", "x", "y", "storey", "z", "size", "class")
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """A target placed by the user, a camera or a digital twin.
+
+    Parameters
+    ----------
+    name
+        As given.
+    x, y
+        World point in metres.
+    storey
+        Name, GlobalId or index of a storey; None if `z` tells, or the job does.
+    z
+        World height in metres, or None.
+    size
+        Width and depth in metres, or None if unknown.
+    ifc_class
+        What was seen, as an IFC class.
+    """
+
+    name: str
+    x: float
+    y: float
+    storey: str | int | None = None
+    z: float | None = None
+    size: tuple[float, float] | None = None
+    ifc_class: str = "IfcBuildingElementProxy"
+
+    def __post_init__(self) -> None:
+        try:
+            self.name.encode()
+            object.__setattr__(self, "x", float(self.x))
+            object.__setattr__(self, "y", float(self.y))
+        except (AttributeError, TypeError, ValueError) as error:  # of what is no text, in no encoding, no number
+            raise ValueRangeError(
+                f"target {self.name!r:.80} at ({self.x!r:.40}, {self.y!r:.40}) cannot be read.",
+                "Give a name in UTF-8, then x and y in metres.",
+            ) from error
+        _checks.fields(self, numbers="z")
+        numbers = {"x": self.x, "y": self.y}
+        if self.z is not None:
+            numbers["z"] = self.z
+        for what, value in numbers.items():
+            if not math.isfinite(value) or abs(value) > _FARTHEST:
+                raise ValueRangeError(
+                    f"target {self.name!r}: {what} is {value}.",
+                    "Give world coordinates of the model in metres.",
+                    {"name": self.name, what: value},
+                )
+        size = np.zeros(2) if self.size is None else _checks.numbers("size", self.size)
+        if size.shape != (2,) or not ((size >= 0) & (size <= 1e3)).all():
+            raise ValueRangeError(f"target {self.name!r}: size is {self.size}.", "Give two lengths from 0 to 1000 m.")
+
+    @property
+    def global_id(self) -> str:
+        """A GlobalId derived from name and position: the same target has the same id in every run."""
+        text = f"{self.name}\0{self.x!r}\0{self.y!r}\0{self.storey!r}\0{self.z!r}"
+        return global_id_of(text)
 
 
 def parse_length(text: str) -> float:
