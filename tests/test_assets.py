@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from bimnav import read_ifc
-from bimnav._asset_names import FIELDS, field_of, tells_nothing
+from bimnav.assets._names import FIELDS, field_of, tells_nothing
 from bimnav.errors import ModelError
 from bimnav.testing import box, room
 from tests.conftest import real_model

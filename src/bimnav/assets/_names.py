@@ -9,7 +9,7 @@ from typing import Any
 from bimnav._placeholders import is_placeholder
 from bimnav.tasks._words import folded
 
-__all__ = ["FIELDS", "field_of", "rank_of", "tells_nothing"]
+__all__ = ["FIELDS", "field_of", "rank_of", "squeezed", "tells_nothing"]
 
 FIELDS: dict[str, str] = {
     "maker": """manufacturer manufacturername manufacturedby maker make brand hersteller herstellername fabrikat
@@ -91,15 +91,14 @@ _SAMPLES = ("sample", "example", "default", "enter", "your", "insert", "muster",
 
 
 @lru_cache(maxsize=1 << 14)
-def _bare(text: str) -> str:
+def squeezed(text: str) -> str:
     """Return letters and digits only, folded."""
     return "".join(char for char in folded(text) if char.isalnum())
 
 
 @lru_cache(maxsize=1 << 14)
 def _known(name: str) -> tuple[str, int] | None:
-    bare = _COBIE.sub("", _bare(name))
-    return _FIELD.get(bare)
+    return _FIELD.get(_COBIE.sub("", squeezed(name)))
 
 
 def field_of(name: str) -> str | None:
@@ -128,11 +127,11 @@ def tells_nothing(name: str, value: Any) -> bool:
         return True
     if isinstance(value, (int, float)):
         return not value or value != value
-    bare, own = _bare(value), _COBIE.sub("", _bare(name))
-    if not bare.strip("0") or bare in _NOTHING or bare in (own, _bare(name)) or is_placeholder(name, value):
+    bare, own = squeezed(value), _COBIE.sub("", squeezed(name))
+    if not bare.strip("0") or bare in _NOTHING or bare in (own, squeezed(name)) or is_placeholder(name, value):
         return True
     if _TEMPLATE.fullmatch(value.strip()) or any(bare == f"{word}{own}" for word in _SAMPLES):
         return True
-    if ":" in value and bare.endswith(own) and _bare(value.rsplit(":", 1)[1]) == own:
+    if ":" in value and bare.endswith(own) and squeezed(value.rsplit(":", 1)[1]) == own:
         return True  # `Window: Manufacturer`
     return field_of(name) == "maker" and bare in _NO_MAKER
