@@ -33,6 +33,8 @@ def test_rooms_touch_their_door_and_not_each_other():
     assert [place.global_id for place in route] == ["space-west", "door", "space-east"]
     assert map_.route((1, 1, 0), (7, 1, 0), closed=["door"]) is None
     assert [place.global_id for place in map_.route((1, 1, 0), (2, 2, 0))] == ["space-west"]
+    assert map_.place_at(1, 1, 0).global_id == "space-west"
+    assert map_.place_at(100, 100, 0) is None
 
 
 @pytest.mark.parametrize("kind", ["stair", "lift"])

@@ -81,9 +81,7 @@ def extract(
     findings = Findings(ids)
     taken_out = [step_id for step_id in open_circles(file, relations.circular) if step_id in ids]
     findings.about_file(renamed, sanitize(products), taken_out, relations.malformed, log)
-
     findings.about_description(sorted_of(file, "IfcProject", "IfcSite", "IfcBuilding"))
-
     asked = [product for product in products if attribute(product, "Representation")]
     no_part = left_out_by_class(file)
     solids, contexts, left_out, lost = _sort_out(asked, no_part)
@@ -129,16 +127,26 @@ def extract(
         "terrain": [rows.element(p) for p in wanted if p.id() in left_out and geometry.shapes[p.id()]],
         **_contents(file, parts, rows, geometry, findings, storey_rows(file, ids, unit_scale)),
         "issues": findings.rows,
-        "ledger": {
-            "asked": [ids[product.id()] for product in asked],
-            "left_out": {ids[step_id]: rule for step_id, rule in left_out.items()},
-            "lost": {ids[step_id]: reason for step_id, reason in lost.items()},
-            "lost_bounds": {
-                ids[p.id()]: box for p in asked if p.id() in lost and (box := extent_of(p, unit_scale)) is not None
-            },
-        },
+        "ledger": _ledger(asked, ids, left_out, lost, unit_scale),
     }
     return Model(tables, arrays)
+
+
+def _ledger(
+    asked: Sequence[Entity],
+    ids: Mapping[int, str],
+    left_out: Mapping[int, str],
+    lost: Mapping[int, str],
+    unit_scale: float,
+) -> dict[str, Any]:
+    """Write down where the products went, with a box around each that was lost where the file tells."""
+    boxes = {ids[p.id()]: extent_of(p, unit_scale) for p in asked if p.id() in lost}
+    return {
+        "asked": [ids[product.id()] for product in asked],
+        "left_out": {ids[step_id]: rule for step_id, rule in left_out.items()},
+        "lost": {ids[step_id]: reason for step_id, reason in lost.items()},
+        "lost_bounds": {global_id: box for global_id, box in boxes.items() if box is not None},
+    }
 
 
 def _sort_out(

@@ -19,7 +19,18 @@ from bimnav._select import select_by_hand
 from bimnav.building import Building, Door, Element, Facts, Issue, Ledger, Opening, Space, Storey
 from bimnav.errors import SelectorError, ValueRangeError
 from bimnav.ifc._findings import Findings
-from bimnav.ifc._frames import SAME, Frame, boxes_of, called, extent_of, find_frame, map_error, moved, placement_of
+from bimnav.ifc._frames import (
+    SAME,
+    Frame,
+    boxes_of,
+    called,
+    doors_with,
+    extent_of,
+    find_frame,
+    map_error,
+    moved,
+    placement_of,
+)
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -223,14 +234,7 @@ def _join(first: Building, other: Building, aliases: dict[str, str]) -> Building
         elements=tuple(elements.values()),
         openings=tuple(openings.values()),
         terrain=tuple(merged(first.terrain, other.terrain).values()),
-        doors=tuple(
-            replace(
-                door,
-                element=elements.get(door.global_id, door.element),
-                opening=door.opening and openings.get(door.opening.global_id, door.opening),
-            )
-            for door in doors.values()
-        ),
+        doors=doors_with(doors.values(), elements, openings),
         connectors=tuple(_united({c.global_id: c for c in b.connectors} for b in (first, other)).values()),
         issues=(*first.issues, *other.issues, *_issues(findings)),
         ledger=_ledger(first.ledger, other.ledger, twins),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 from weakref import WeakKeyDictionary
@@ -11,10 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bimnav._georeference import turn_of
-from bimnav.building import Building, Detection, Element, Opening, Shape, Space, Storey
+from bimnav.building import Building, Detection, Door, Element, Opening, Shape, Space, Storey
 from bimnav.errors import ValueRangeError
 
-__all__ = ["SAME", "Frame", "boxes_of", "called", "extent_of", "find_frame", "map_error", "moved", "placement_of"]
+__all__ = [
+    "SAME",
+    "Frame",
+    "boxes_of",
+    "called",
+    "doors_with",
+    "extent_of",
+    "find_frame",
+    "map_error",
+    "moved",
+    "placement_of",
+]
 
 SAME = 0.01  # metres within which places, sizes and heights are the same
 _FEW = 3  # a chair or two may have been moved, and not the building
@@ -163,6 +174,20 @@ def _placed(box: NDArray[np.float64], placement: Placement) -> NDArray[np.float6
     return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
+def doors_with(
+    doors: Iterable[Door], elements: Mapping[str, Element], openings: Mapping[str, Opening]
+) -> tuple[Door, ...]:
+    """Return doors with other elements and openings, where there are others of their GlobalIds."""
+    return tuple(
+        replace(
+            door,
+            element=elements.get(door.global_id, door.element),
+            opening=door.opening and openings.get(door.opening.global_id, door.opening),
+        )
+        for door in doors
+    )
+
+
 def moved(building: Building, placement: Placement) -> Building:
     """Return a building with all its coordinates changed."""
 
@@ -184,14 +209,7 @@ def moved(building: Building, placement: Placement) -> Building:
         elements=tuple(elements.values()),
         openings=tuple(openings.values()),
         terrain=tuple(of(building.terrain).values()),
-        doors=tuple(
-            replace(
-                door,
-                element=elements.get(door.global_id, door.element),
-                opening=door.opening and openings.get(door.opening.global_id, door.opening),
-            )
-            for door in building.doors
-        ),
+        doors=doors_with(building.doors, elements, openings),
         connectors=tuple(
             replace(connector, low=connector.low + rise, high=connector.high + rise)
             for connector in building.connectors

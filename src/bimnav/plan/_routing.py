@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    import pyvrp
+
     from bimnav.plan.orders import Groups
 
 __all__ = ["Robots", "Routing", "route"]
@@ -88,7 +90,34 @@ def route(
     from pyvrp.stop import MaxIterations, MaxRuntime, MultipleCriteria
 
     whole = _Whole(robots.costs)
-    n = len(robots.costs[0])
+    clients, groups = _clients(ways, whole, due, weight, demands)
+    depots, types, matrices = _fleet(robots, whole, longest)
+    places = [pyvrp.Location(0, 0) for _ in range(len(matrices[0]))]
+    data = pyvrp.ProblemData(places, clients, depots, types, matrices, matrices, groups)
+    stop = MaxIterations(iterations)
+    limit = MaxRuntime(max(time_limit, 1e-3)) if time_limit is not None else None
+    criteria = stop if limit is None else MultipleCriteria([stop, limit])
+    with warnings.catch_warnings():  # that limits are hard to keep shows in the result
+        warnings.simplefilter("ignore", PenaltyBoundWarning)
+        found = pyvrp.solve(data, criteria, seed=_SEED, collect_stats=False, display=False)
+    routes = [np.zeros(0, dtype=np.intp) for _ in robots.starts]
+    for trip in found.best.routes():
+        routes[trip.vehicle_type()] = np.array([clients[a.idx].location for a in trip if a.is_client()], dtype=np.intp)
+    return Routing(
+        routes, found.num_iterations < iterations, found.is_feasible() and found.best.distance() < whole.never
+    )
+
+
+def _clients(
+    ways: Groups,
+    whole: _Whole,
+    due: NDArray[np.float64] | None,
+    weight: NDArray[np.float64] | None,
+    demands: NDArray[np.float64] | None,
+) -> tuple[list[pyvrp.Client], list[pyvrp.ClientGroup]]:
+    """Make a client of every row, and a group of the rows of which one is enough."""
+    import pyvrp
+
     is_optional = due is not None
     prize = np.ones(len(ways)) if weight is None else weight
     clients: list[pyvrp.Client] = []
@@ -109,36 +138,34 @@ def route(
             clients.append(pyvrp.Client(row, **options))
         if alternatives:
             groups.append(pyvrp.ClientGroup(list(members), required=not is_optional))
-    depots, types = [], []
+    return clients, groups
+
+
+def _fleet(
+    robots: Robots, whole: _Whole, longest: float
+) -> tuple[list[pyvrp.Depot], list[pyvrp.VehicleType], list[Any]]:
+    """Make of every robot its two depots, its kind of vehicle, and its costs with a last row for any end."""
+    import pyvrp
+
+    n = len(robots.costs[0])
+    depots: list[pyvrp.Depot] = []
+    types: list[pyvrp.VehicleType] = []
     matrices: list[Any] = []
     for k, (start, end) in enumerate(zip(robots.starts, robots.ends, strict=True)):
-        matrix = np.full((n + 1, n + 1), 0, dtype=np.int64)  # to the last row it costs nothing: any end
+        matrix = np.zeros((n + 1, n + 1), dtype=np.int64)  # to the last row it costs nothing: any end
         matrix[:n, :n] = whole.ceil(robots.costs[k])
         if robots.allowed is not None:
             matrix[:n, :n][:, ~robots.allowed[k] & (np.arange(n) != start)] = whole.never
         np.fill_diagonal(matrix, 0)
         matrices.append(matrix)
         depots += [pyvrp.Depot(start), pyvrp.Depot(n if end is None else end)]
-        limits: dict[str, Any] = (
-            {} if robots.capacities is None else {"capacity": [math.floor(robots.capacities[k] * _SCALE)]}
-        )
+        limits: dict[str, Any] = {}
+        if robots.capacities is not None:
+            limits["capacity"] = [math.floor(robots.capacities[k] * _SCALE)]
         if math.isfinite(longest):
             limits["shift_duration"] = whole.floor(longest)
         types.append(pyvrp.VehicleType(1, start_depot=2 * k, end_depot=2 * k + 1, profile=k, **limits))
-    places = [pyvrp.Location(0, 0) for _ in range(n + 1)]
-    data = pyvrp.ProblemData(places, clients, depots, types, matrices, matrices, groups)
-    stop = MaxIterations(iterations)
-    limit = MaxRuntime(max(time_limit, 1e-3)) if time_limit is not None else None
-    criteria = stop if limit is None else MultipleCriteria([stop, limit])
-    with warnings.catch_warnings():  # that limits are hard to keep shows in the result
-        warnings.simplefilter("ignore", PenaltyBoundWarning)
-        found = pyvrp.solve(data, criteria, seed=_SEED, collect_stats=False, display=False)
-    routes = [np.zeros(0, dtype=np.intp) for _ in robots.starts]
-    for trip in found.best.routes():
-        routes[trip.vehicle_type()] = np.array([clients[a.idx].location for a in trip if a.is_client()], dtype=np.intp)
-    return Routing(
-        routes, found.num_iterations < iterations, found.is_feasible() and found.best.distance() < whole.never
-    )
+    return depots, types, matrices
 
 
 class _Whole:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -150,30 +150,11 @@ def plan_tours(
     if stops is None:
         stops, lost = _stops_from(graph, starts)
         unreached += lost
-    rows: list[tuple[Stop, Stand]] = []
-    groups: list[int] = [-1 - k for k in range(len(starts))]
-    allowed = [[True] * len(starts) for _ in starts]
-    for number, stop in enumerate(stops):
-        able = [set(stop.abilities) <= set(robot.abilities) for robot in robots]
-        served = [
-            (stand, [a and not why_unreached(graph, start, stand.cell) for a, start in zip(able, starts, strict=True)])
-            for stand in near_stands(stop)
-        ]
-        served = [(stand, by) for stand, by in served if any(by)]
-        if not served:
-            lacking = f"no robot has the abilities {', '.join(stop.abilities)}"
-            near = starts[able.index(True)] if any(able) else None
-            reason = lacking if near is None else why_unreached(graph, near, stop.cell)
-            left = Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell)
-            unreached += [left] if near is None else explained(graph, near, [left])
-        for stand, by in served:
-            rows.append((stop, stand))
-            groups.append(number)
-            for k, may in enumerate(by):
-                allowed[k].append(may)
-    cells = [*starts, *(stand.cell for _, stand in rows)]
+    work, lost = _work_of(graph, starts, stops, robots)
+    unreached += lost
+    cells = [*starts, *(stand.cell for _, stand in work.stands)]
     cost = distance_matrix(graph, cells)
-    service = np.array([0.0] * len(starts) + [seconds_at(graph, stop) for stop, _ in rows])
+    service = np.array([0.0] * len(starts) + [seconds_at(graph, stop) for stop, _ in work.stands])
     costs = [
         cost if objective == "total" else legs_between(graph, cells, cost, robot).seconds + service for robot in robots
     ]
@@ -181,13 +162,13 @@ def plan_tours(
         costs,
         range(len(starts)),
         return_to_start=return_to_start,
-        groups=groups,
-        allowed=np.array(allowed),
+        groups=work.groups,
+        allowed=np.array(work.allowed),
         objective=objective,
     )
     tours = []
     for k, (robot, route) in enumerate(zip(robots, shares.routes, strict=True)):
-        own = [rows[row - len(starts)][0] for row in route[1:]]
+        own = [work.stands[row - len(starts)][0] for row in route[1:]]
         tours.append(
             plan_tour(
                 graph,
@@ -202,6 +183,41 @@ def plan_tours(
         )
     unreached += [lost for tour in tours for lost in tour.unreached]
     return TeamPlan(tuple(robots), tuple(tours), objective, shares.bound, shares.is_optimal, tuple(unreached))
+
+
+class _Work(NamedTuple):
+    """Places to serve stops from, and who can; a row for each start goes before those of the places."""
+
+    stands: list[tuple[Stop, Stand]]
+    groups: list[int]  # of every row; places of one stop are alternatives
+    allowed: list[list[bool]]  # for each robot and row
+
+
+def _work_of(
+    graph: NavGraph, starts: Sequence[Cell], stops: Iterable[Stop], robots: Sequence[Robot]
+) -> tuple[_Work, list[Unreached]]:
+    """Return which robots can serve each stop and where, and the stops that none of them can."""
+    work = _Work([], [-1 - k for k in range(len(starts))], [[True] * len(starts) for _ in starts])
+    unreached: list[Unreached] = []
+    for number, stop in enumerate(stops):
+        able = [set(stop.abilities) <= set(robot.abilities) for robot in robots]
+        served = [
+            (stand, [a and not why_unreached(graph, start, stand.cell) for a, start in zip(able, starts, strict=True)])
+            for stand in near_stands(stop)
+        ]
+        served = [(stand, by) for stand, by in served if any(by)]
+        if not served:
+            lacking = f"no robot has the abilities {', '.join(stop.abilities)}"
+            near = starts[able.index(True)] if any(able) else None
+            reason = lacking if near is None else why_unreached(graph, near, stop.cell)
+            left = Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell)
+            unreached += [left] if near is None else explained(graph, near, [left])
+        for stand, by in served:
+            work.stands.append((stop, stand))
+            work.groups.append(number)
+            for k, may in enumerate(by):
+                work.allowed[k].append(may)
+    return work, unreached
 
 
 def _stops_from(graph: NavGraph, starts: Sequence[Cell]) -> tuple[tuple[Stop, ...], list[Unreached]]:
