@@ -417,11 +417,10 @@ class _Search:
         return float(np.hypot(centers[:, 0] - x, centers[:, 1] - y).min(initial=math.inf))
 
     def _around(self) -> tuple[str, ...]:
-        """GlobalIds of the obstacles at its point, else of the nearest one."""
+        """Return the GlobalIds of the obstacles at its point, without its own."""
         point = shapely.Point(self.target.destination[:2])
-        on = [(body.distance(point), o) for o, body in self.environment.bodies_on(self.storey)]
-        at = [o.global_id for away, o in on if away == 0 and o.global_id != self.target.global_id]
-        return tuple(dict.fromkeys(at))
+        at = (o.global_id for o, body in self.environment.bodies_on(self.storey) if body.intersects(point))
+        return tuple(dict.fromkeys(g for g in at if g != self.target.global_id))
 
     def _hidden(self, order: NDArray[np.int64], blockers: Counter[int]) -> Miss:
         near = float(self._distances()[order].min())

@@ -12,10 +12,9 @@ import shapely
 from numpy.typing import NDArray
 
 from bimnav._doorways import Doorway, doorway_of
-from bimnav._indoors import outline
 from bimnav._levels import NEAR, Ground
 from bimnav.building import Building, Connector, Door, Shape
-from bimnav.footprint import unite, whole
+from bimnav.footprint import outline, unite, whole
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

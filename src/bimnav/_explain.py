@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import shapely
 
-from bimnav._floors import NEAR, outline
+from bimnav._floors import NEAR
 from bimnav.building import Building, Element, Space
 from bimnav.errors import GridError, ModelError
+from bimnav.footprint import outline
 from bimnav.grid import EROSION, Cell
 
 if TYPE_CHECKING:

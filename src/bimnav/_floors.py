@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from bimnav._doorways import Doorway, doorway_of
-from bimnav._indoors import Shell, opened, outline, part_in
+from bimnav._indoors import Shell, opened, part_in
 from bimnav._levels import NEAR, Ground, Room
 from bimnav._wording import counted
 from bimnav.building import Building, Issue, Storey
@@ -20,7 +20,7 @@ from bimnav.robot import Robot
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["FLOOR_SOURCES", "NEAR", "Floor", "FloorSource", "Piece", "find_floors", "outline"]
+__all__ = ["FLOOR_SOURCES", "NEAR", "Floor", "FloorSource", "Piece", "find_floors"]
 
 FloorSource: TypeAlias = Literal["space", "slab", "covering", "landing", "hull", "door", "passage", "outdoors"]
 

@@ -9,12 +9,12 @@ import shapely
 
 from bimnav._doorways import doorway_of
 from bimnav.building import Building, Element, Shape
-from bimnav.footprint import footprints_of, project, unite
+from bimnav.footprint import footprints_of, unite
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Shell", "filled", "opened", "outline", "part_in"]
+__all__ = ["Shell", "filled", "opened", "part_in"]
 
 _WALLS = ("IfcWall", "IfcCurtainWall", "IfcPlate", "IfcMember", "IfcWindow", "IfcColumn")
 _CUT = (1.2, 1.5)  # metres above a floor: over parapets and railings, through windows, under lintels
@@ -26,11 +26,6 @@ _ENCLOSED = 0.5  # share of what the hull of the walls holds; walls that enclose
 def part_in(shapes: Sequence[Shape], low: float, high: float) -> BaseGeometry:
     """Return the plan view of what lies between two world heights."""
     return unite(part.polygon for part in footprints_of(shapes, low, high) if part is not None)
-
-
-def outline(shapes: Sequence[Shape]) -> BaseGeometry:
-    """Return the plan view of shapes over their whole height."""
-    return unite(project(shape).polygon for shape in shapes)
 
 
 def filled(polygon: BaseGeometry) -> BaseGeometry:

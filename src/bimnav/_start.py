@@ -15,7 +15,7 @@ from bimnav.building import Element, Space
 from bimnav.environment import IndoorEnvironment, Place, Region
 from bimnav.errors import GoalBlockedError, NothingWalkableError, OutsideMapError, StartBlockedError
 from bimnav.graph import NavGraph
-from bimnav.grid import Cell
+from bimnav.grid import Cell, nearest_cell
 
 __all__ = ["Start", "find_end", "find_start"]
 
@@ -122,14 +122,8 @@ def _nearest_free(
         own = frame.cell_at(x, y, storey=storey)
         if free[own[1:]] and _environment_of(graph).is_clear(storey, (x, y)):
             return own, (x, y, frame.elevations[storey])
-    rows, cols = np.nonzero(free)
-    if not len(rows):
-        return None
-    centers = frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
-    distance = np.round(np.hypot(centers[:, 0] - x, centers[:, 1] - y), 9)  # equally near: by row and column
-    k = int(np.lexsort((cols, rows, distance))[0])
-    cell = Cell(storey, int(rows[k]), int(cols[k]))
-    return cell, frame.center_of(cell)
+    found = nearest_cell(frame, free, storey, x, y)
+    return found and (found[0], frame.center_of(found[0]))
 
 
 def _place_at(graph: NavGraph, place: Place, role: Literal["start", "end"]) -> Start:

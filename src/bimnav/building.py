@@ -404,7 +404,7 @@ class Building:
     def _repr_html_(self) -> str:
         """Return a card for a notebook."""
         from bimnav._cards import card, counted, plan_svg
-        from bimnav._indoors import outline
+        from bimnav.footprint import outline
 
         storeys = (f"{storey.name} ({storey.elevation:.2f} m)" for storey in self.storeys)
         lowest = next((s.storey for s in self.spaces), None)

@@ -32,6 +32,7 @@ __all__ = [
     "footprint",
     "footprints_of",
     "merge_footprints",
+    "outline",
     "project",
     "subtract",
     "triangulate",
@@ -157,8 +158,9 @@ def subtract(host: Mesh, cutters: Sequence[tuple[Mesh, NDArray[np.float64]]]) ->
     host
         A solid.
     cutters
-        Each with its (4, 4) placement in the coordinates of the host. They are made 10 micrometres
-        larger on every side, so that no skin stays where faces are flush. One that lies beside the host is skipped.
+        Each with its (4, 4) placement in the coordinates of the host. They are made a fifth
+        of a micrometre larger on every side, so that no skin stays where faces are flush. One that lies beside
+        the host is skipped.
 
     Returns
     -------
@@ -435,6 +437,11 @@ def unite(polygons: Iterable[BaseGeometry]) -> BaseGeometry:
     origin = np.array([left + right, bottom + top]) / 2
     rings = [shapely.get_coordinates(ring)[:-1] - origin for ring in shapely.get_rings(parts)]
     return _valid(shapely.transform(_polygon_of(_region_of(rings)), lambda points: points + origin))
+
+
+def outline(shapes: Iterable[Shape]) -> BaseGeometry:
+    """Return the plan view of shapes over their whole height, Polygon or MultiPolygon in world metres."""
+    return unite(project(shape).polygon for shape in shapes)
 
 
 def merge_footprints(footprints: Sequence[Footprint]) -> Footprint:

@@ -304,6 +304,32 @@ def cells_within(frame: GridFrame, polygons: BaseGeometry | Iterable[BaseGeometr
     return inside & ~touched
 
 
+def nearest_cell(
+    frame: GridFrame, among: NDArray[np.bool_], storey: int, x: float, y: float
+) -> tuple[Cell, float] | None:
+    """Find the cell nearest to a point; of equally near ones the first by row, then by column.
+
+    Parameters
+    ----------
+    among : (rows, cols) bool
+        Which cells of the storey count.
+    x, y
+        World metres.
+
+    Returns
+    -------
+    found
+        The cell, and how far its middle is from the point, metres; None if no cell counts.
+    """
+    rows, cols = np.nonzero(among)
+    if not len(rows):
+        return None
+    centers = frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
+    distance = np.round(np.hypot(centers[:, 0] - x, centers[:, 1] - y), 9)
+    k = int(np.lexsort((cols, rows, distance))[0])
+    return Cell(storey, int(rows[k]), int(cols[k])), float(distance[k])
+
+
 def _mark(
     frame: GridFrame,
     polygons: BaseGeometry | Iterable[BaseGeometry],

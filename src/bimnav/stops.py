@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 from bimnav import _checks
 from bimnav.grid import Cell
 
-__all__ = ["Approach", "Stand", "Stop", "Unreached"]
+__all__ = ["Approach", "Stand", "Stop", "Unreached", "given_up"]
 
 Approach = Literal["center", "standing", "reach", "space"]
 
@@ -118,3 +118,8 @@ class Unreached:
     cell: Cell | None = None
     miss: float | None = None
     blocking: tuple[str, ...] = ()
+
+
+def given_up(stop: Stop, reason: str) -> Unreached:
+    """Return a stop as one that is not served."""
+    return Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import shapely
 
@@ -15,9 +15,6 @@ from bimnav.assets._facts import facts_of, product_of
 from bimnav.assets._flow import Neighbor, neighbors_of
 from bimnav.assets._names import field_of, rank_of, squeezed, tells_nothing
 from bimnav.building import Building, Element, Space
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
 __all__ = ["Asset", "AssetCode", "AssetDocument", "Neighbor", "read_asset"]
 
@@ -154,6 +151,8 @@ def _storey_of(building: Building, product: Element | Space) -> str:
 
 def _room_of(building: Building, product: Element | Space) -> str:
     """Return the label of the room that the file says, else of the one where the middle of the element lies."""
+    from bimnav.footprint import outline
+
     if isinstance(product, Space):
         return product.label
     stated = next((space.label for space in building.spaces if space.global_id == product.space), "")
@@ -166,13 +165,7 @@ def _room_of(building: Building, product: Element | Space) -> str:
         if box is None or not (box[0, 2] - _BESIDE <= z <= box[1, 2] + _BESIDE):
             continue
         if box[0, 0] - _BESIDE <= x <= box[1, 0] + _BESIDE and box[0, 1] - _BESIDE <= y <= box[1, 1] + _BESIDE:
-            away = _outline(space).distance(point)
+            away = outline(space.shapes).distance(point)
             near.append((away, not box[0, 2] <= z <= box[1, 2], space.label))
     best = min(near, default=(_BESIDE + 1, False, ""))
     return best[2] if best[0] <= _BESIDE else ""
-
-
-def _outline(space: Space) -> BaseGeometry:
-    from bimnav.footprint import project, unite
-
-    return unite(project(shape).polygon for shape in space.shapes)

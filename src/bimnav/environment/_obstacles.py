@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from bimnav._door_access import DoorAccess
 from bimnav._doorways import doorway_of
-from bimnav._floors import NEAR, outline
+from bimnav._floors import NEAR
 from bimnav.building import Building, Element
 from bimnav.environment._values import Obstacle, Zone, grown
-from bimnav.footprint import Footprint, footprints_of, merge_footprints
+from bimnav.footprint import Footprint, footprints_of, merge_footprints, outline
 from bimnav.robot import Robot
 
 if TYPE_CHECKING:

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from bimnav._floors import NEAR, outline
+from bimnav._floors import NEAR
 from bimnav._sight import LIFTED, UNDER, sight_of
 from bimnav.building import Building, Detection, Element, Space
 from bimnav.environment._values import IndoorEnvironment, Target
+from bimnav.footprint import outline
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

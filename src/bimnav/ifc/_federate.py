@@ -364,11 +364,11 @@ def _gap(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 def _twins(first: Building, other: Building) -> dict[str, str]:
     """Find the spaces of the other building that are here under another GlobalId: they cover the same floor."""
-    from bimnav.footprint import project, unite
+    from bimnav.footprint import outline
 
     @cache
-    def outline(space: Space) -> BaseGeometry:
-        return unite(project(shape).polygon for shape in space.shapes)
+    def floor_of(space: Space) -> BaseGeometry:
+        return outline(space.shapes)
 
     known = {space.global_id for space in first.spaces}
     rooms = [(room, box) for room in first.spaces if (box := room.bounds) is not None]
@@ -377,7 +377,7 @@ def _twins(first: Building, other: Building) -> dict[str, str]:
         if space.global_id in known or (box := space.bounds) is None:
             continue
         near = (room for room, around in rooms if _shares_height(box, around) and _gap(box, around) < 0)
-        twin = next((room for room in near if _is_same_floor(outline(room), outline(space))), None)
+        twin = next((room for room in near if _is_same_floor(floor_of(room), floor_of(space))), None)
         if twin:
             twins[space.global_id] = twin.global_id
     return twins

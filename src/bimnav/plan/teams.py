@@ -18,7 +18,7 @@ from bimnav.plan.legs import legs_between
 from bimnav.plan.paths import Algorithm, distance_matrix, free_index
 from bimnav.plan.tours import Tour, explained, near_stands, plan_tour, seconds_at, why_unreached
 from bimnav.robot import Robot
-from bimnav.stops import Stand, Stop, Unreached
+from bimnav.stops import Stand, Stop, Unreached, given_up
 
 __all__ = ["TeamPlan", "plan_tours"]
 
@@ -210,7 +210,7 @@ def _work_of(
             lacking = f"no robot has the abilities {', '.join(stop.abilities)}"
             near = starts[able.index(True)] if any(able) else None
             reason = lacking if near is None else why_unreached(graph, near, stop.cell)
-            left = Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell)
+            left = given_up(stop, reason)
             unreached += [left] if near is None else explained(graph, near, [left])
         for stand, by in served:
             work.stands.append((stop, stand))

@@ -16,7 +16,7 @@ from bimnav import _checks
 from bimnav._why import why_unreachable
 from bimnav.errors import InputError
 from bimnav.graph import NavGraph
-from bimnav.grid import Cell
+from bimnav.grid import Cell, nearest_cell
 from bimnav.plan.charging import Charge, plan_charging
 from bimnav.plan.legs import legs_between
 from bimnav.plan.orders import gap_of, order_stops
@@ -32,7 +32,7 @@ from bimnav.plan.paths import (
 )
 from bimnav.robot import Robot
 from bimnav.smooth import turns_of
-from bimnav.stops import Stand, Stop, Unreached
+from bimnav.stops import Stand, Stop, Unreached, given_up
 
 __all__ = ["Tour", "find_chargers", "near_stands", "plan_tour", "seconds_at", "why_unreached"]
 
@@ -242,8 +242,7 @@ def plan_tour(
     for stop in stops:
         places = tuple(stand for stand in near_stands(stop) if not why_unreached(graph, start, stand.cell))
         if not places:
-            reason = why_unreached(graph, start, stop.cell)
-            unreached.append(Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell))
+            unreached.append(given_up(stop, why_unreached(graph, start, stop.cell)))
         else:
             cells = tuple(stand.cell for stand in places)
             due = math.inf if stop.due is None else stop.due
@@ -252,7 +251,7 @@ def plan_tour(
     ordered = _ordered(graph, start, end, list(found.items()), robot, return_to_start)
     for stop in ordered.late:
         reason = f"it cannot be done within {stop.due:g} s of the start"
-        unreached.append(Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell))
+        unreached.append(given_up(stop, reason))
     point = graph.frame.center_of(start) if start_point is None else start_point
     planned = Tour(
         graph,
@@ -282,7 +281,7 @@ def _driven(
         visits, charges, flat = _charged(graph, start, goal, visits, robot, known)
         for stop in flat:
             reason = f"the battery of {robot.battery_wh:g} Wh does not last, and no charger is near enough"
-            unreached.append(Unreached(stop.global_id, stop.name, stop.destination, reason, stop.cell))
+            unreached.append(given_up(stop, reason))
     cells = [start, *(stop.cell for stop in visits)]
     if goal is not None and (visits or tour.end is not None):
         cells.append(goal)
@@ -386,16 +385,12 @@ def find_chargers(graph: NavGraph, start: Cell) -> tuple[Stop, ...]:
                 continue
             x, y = dock.bounds[:, :2].mean(axis=0).tolist()
             storey = graph.frame.storey_at(float(dock.bounds[0, 2]))
-            rows, cols = np.nonzero(reachable[storey])
-            centers = graph.frame.centers_of(np.column_stack([np.full_like(rows, storey), rows, cols]))
-            distance = np.round(np.hypot(centers[:, 0] - x, centers[:, 1] - y), 9)
-            if not len(distance) or distance.min() > _DOCK:
+            near = nearest_cell(graph.frame, reachable[storey], storey, x, y)
+            if near is None or near[1] > _DOCK:
                 continue
-            k = int(np.lexsort((cols, rows, distance))[0])
-            cell = Cell(storey, int(rows[k]), int(cols[k]))
+            cell, away = near
             point = graph.frame.center_of(cell)
             destination = (x, y, point[2])
-            away = float(distance[k])
             chargers.append(Stop(dock.global_id, dock.name, cell, destination, point, "standing", away, kind="charger"))
     return tuple(chargers)
 
