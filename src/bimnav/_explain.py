@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import shapely
 
 from bimnav._floors import NEAR
-from bimnav.building import Building, Element, Space
+from bimnav.building import Building, Element, Space, product_of
 from bimnav.errors import GridError, ModelError
 from bimnav.footprint import outline
 from bimnav.grid import EROSION, Cell
@@ -180,7 +180,7 @@ def explain_element(environment: IndoorEnvironment, global_id: str) -> Explanati
         If the building has neither element, room nor target of this GlobalId.
     """
     building = environment.building
-    product = _product(building, global_id)
+    product = product_of(building, global_id)
     reasons = tuple(_roles(environment, global_id, product))
     if product is None and not reasons:
         raise ModelError(
@@ -259,7 +259,7 @@ def explain_cell(graph: NavGraph, cell: Cell) -> CellExplanation:
     told = {reason.global_id for reason in reasons}
     for target, place in graph.targets if environment else ():
         if place == cell and environment and target.global_id not in told:
-            found = _roles(environment, target.global_id, _product(environment.building, target.global_id))
+            found = _roles(environment, target.global_id, product_of(environment.building, target.global_id))
             reasons += tuple(reason for reason in found if reason.role == "target")
     cost = float(graph.cost[cell])
     storey = environment.storeys[cell.storey].name if environment else f"storey {cell.storey}"
@@ -292,14 +292,14 @@ def _touching(environment: IndoorEnvironment, storey: int, cell: BaseGeometry) -
     for obstacle, body in environment.bodies_on(storey):
         if body.intersects(cell):
             blocking.add(obstacle.global_id)
-            product = _product(building, obstacle.global_id)
+            product = product_of(building, obstacle.global_id)
             picks = () if product is None else _of(_picks(task, product, building), "obstacles", "doors")
             under = obstacle.footprint.intersects(cell)
             yield _blocking(obstacle, picks, "" if under else "; the cell lies within the robot's radius of it")
     over = {product.global_id: product for product in _over(environment, storey, cell)}
     for zone in environment.zones:  # those around a thing, too
         if zone.storey == storey and zone.global_id not in over and zone.polygon.intersects(cell):
-            found = _roles(environment, zone.global_id, _product(building, zone.global_id))
+            found = _roles(environment, zone.global_id, product_of(building, zone.global_id))
             yield from (r for r in found if r.role in ("restricted", "avoid") and r.storey == storey)
     for product in over.values():
         if product.global_id in blocking:
@@ -316,7 +316,7 @@ def _lost(building: Building, cell: BaseGeometry) -> Iterator[Reason]:
     """Yield what was lost somewhere in a box over the cell."""
     for global_id, (low, high) in building.ledger.lost_bounds.items():
         if shapely.box(*low[:2], *high[:2]).intersects(cell):
-            product = _product(building, global_id)
+            product = product_of(building, global_id)
             name, ifc_class = (product.name, product.ifc_class) if product else ("", "lost product")
             rule = f"it lies somewhere in this box: {building.ledger.lost[global_id]}"
             yield Reason(global_id, name, ifc_class, "lost", rule, None, float(low[2]), float(high[2]))
@@ -355,12 +355,6 @@ def _out_of_band(environment: IndoorEnvironment, element: Element, storey: int) 
 def _heights(product: Element | Space | None) -> tuple[float | None, float | None]:
     bounds = None if product is None else product.bounds
     return (None, None) if bounds is None else (float(bounds[0, 2]), float(bounds[1, 2]))
-
-
-def _product(building: Building, global_id: str) -> Element | Space | None:
-    if global_id in building:
-        return building[global_id]
-    return next((space for space in building.spaces if space.global_id == global_id), None)
 
 
 def _picks(task: Task, product: Element | Space, building: Building) -> tuple[RulePick, ...]:

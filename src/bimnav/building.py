@@ -532,3 +532,10 @@ class Building:
                 self.storey_index(target.storey)
             added.append(target)
         return replace(self, detections=self.detections + tuple(added))
+
+
+def product_of(building: Building, global_id: str) -> Element | Space | None:
+    """Return the element or room of a GlobalId; None if there is none."""
+    if global_id in building:
+        return building[global_id]
+    return next((space for space in building.spaces if space.global_id == global_id), None)

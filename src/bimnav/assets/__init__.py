@@ -11,10 +11,11 @@ import shapely
 
 from bimnav.assets._card import Asset, AssetCode, AssetDocument
 from bimnav.assets._durations import day_after, day_of, duration_text
-from bimnav.assets._facts import facts_of, product_of
+from bimnav.assets._facts import facts_of
 from bimnav.assets._flow import Neighbor, neighbors_of
 from bimnav.assets._names import field_of, rank_of, squeezed, tells_nothing
-from bimnav.building import Building, Element, Space
+from bimnav.building import Building, Element, Space, product_of
+from bimnav.errors import ModelError
 
 __all__ = ["Asset", "AssetCode", "AssetDocument", "Neighbor", "read_asset"]
 
@@ -32,6 +33,12 @@ def read_asset(building: Building, global_id: str) -> Asset:
         If nothing has this GlobalId.
     """
     product = product_of(building, global_id)
+    if product is None:
+        raise ModelError(
+            f"no element or room of {building.name!r} has the GlobalId {global_id!r}.",
+            "building.elements and building.spaces list them all; upper and lower case count.",
+            {"global_id": global_id},
+        )
     facts = facts_of(building, global_id)
     values, sources = _values(facts)
     spares = [(name, f"spare parts in {file}") for file, told in facts for name in told.get("spares", ())]

@@ -6,23 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bimnav.building import Building, Element, Space
-from bimnav.errors import ModelError
+from bimnav.building import Building
 
-__all__ = ["facts_of", "product_of"]
-
-
-def product_of(building: Building, global_id: str) -> Element | Space:
-    if global_id in building:
-        return building[global_id]
-    for space in building.spaces:
-        if space.global_id == global_id:
-            return space
-    raise ModelError(
-        f"no element or room of {building.name!r} has the GlobalId {global_id!r}.",
-        "building.elements and building.spaces list them all; upper and lower case count.",
-        {"global_id": global_id},
-    )
+__all__ = ["facts_of"]
 
 
 def facts_of(building: Building, global_id: str) -> list[tuple[str, Mapping[str, Any]]]:

@@ -157,20 +157,25 @@ def read_apart(
                 thorough += [suspect] if suspect else []
                 _LOG.info("%s: reading again, one product at a time: %s", path.name, error)
             careful = True
-            continue
-        try:
-            model = unpack(packed)
-            if lost:
-                known = model.tables["ledger"]["lost"]
-                known.update({global_id: reason for global_id, reason in lost.items() if global_id in known})
-                packed = pack(model)
-        except (ValueError, LookupError, AttributeError, TypeError) as error:
-            raise ReaderCrashError(
-                f"{path.name}: the reading process gave a bad answer: {error}.",
-                f"{_SAFE} The file may be hostile; do not use it.",
-                {"path": str(path)},
-            ) from error
-        return Reading(model, packed, lost, repeatable)
+        else:
+            return _reading_of(path, packed, lost, repeatable)
+
+
+def _reading_of(path: Path, packed: bytes, lost: dict[str, str], repeatable: bool) -> Reading:
+    """Unpack an answer, and write down in its ledger why products were set aside."""
+    try:
+        model = unpack(packed)
+        if lost:
+            known = model.tables["ledger"]["lost"]
+            known.update({global_id: reason for global_id, reason in lost.items() if global_id in known})
+            packed = pack(model)
+    except (ValueError, LookupError, AttributeError, TypeError) as error:
+        raise ReaderCrashError(
+            f"{path.name}: the reading process gave a bad answer: {error}.",
+            f"{_SAFE} The file may be hostile; do not use it.",
+            {"path": str(path)},
+        ) from error
+    return Reading(model, packed, lost, repeatable)
 
 
 def read_here(path: Path, report: Report) -> Reading:

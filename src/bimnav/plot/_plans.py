@@ -211,13 +211,9 @@ def plot_fleet(
     key: list[Any] = []
     for k, (robot, tour) in enumerate(zip(plan.robots, plan.tours, strict=True)):
         color = ROBOTS[k % len(ROBOTS)]
-        pieces, climbs = _parts_of(tour, level)
-        ax.add_collection(LineCollection(pieces, colors=color, linewidths=1.8, zorder=6, capstyle="round"))
-        ax.add_collection(LineCollection(climbs, colors=color, linewidths=1.8, zorder=6, linestyles=":"))
-        for piece in pieces:
-            draw_arrow(ax, piece, color)
+        _draw_way(ax, tour, level, color)
         if tour.start.storey == storey:
-            ax.plot(*tour.start_point[:2], "s", color=color, markersize=9, markeredgecolor="white", zorder=8)
+            _draw_start(ax, tour, color)
         for number, stop in enumerate(tour.stops, 1):
             if stop.cell.storey == storey:
                 draw_mark(ax, stop.end, str(number), color)
@@ -307,16 +303,12 @@ def plot_tour(tour: Tour, *, storey: int | None = None, ax: Axes | None = None, 
     storey = storey_of(storey, tour.start.storey, graph.frame.elevations)
     ax = plot_graph(graph, storey=storey, ax=ax, unit=unit)
     level = graph.frame.elevations[storey]
-    legs, climbs = _parts_of(tour, level)
-    ax.add_collection(LineCollection(legs, colors=COLORS["path"], linewidths=1.8, zorder=6, capstyle="round"))
-    ax.add_collection(LineCollection(climbs, colors=COLORS["path"], linewidths=1.8, zorder=6, linestyles=":"))
-    for leg in legs:
-        draw_arrow(ax, leg)
+    climbs = _draw_way(ax, tour, level, COLORS["path"])
     key: list[Any] = [Line2D([], [], color=COLORS["path"], linewidth=1.8, label=f"route, {tour.length:.1f} m")]
     if climbs:
         key.append(Line2D([], [], color=COLORS["path"], linewidth=1.8, linestyle=":", label="to another storey"))
     if tour.start.storey == storey:
-        ax.plot(*tour.start_point[:2], "s", color=COLORS["start"], markersize=9, markeredgecolor="white", zorder=8)
+        _draw_start(ax, tour, COLORS["start"])
         key.append(Line2D([], [], color=COLORS["start"], marker="s", linestyle="none", label="start"))
     names = []
     for number, stop in enumerate(tour.stops, 1):
@@ -337,10 +329,20 @@ def plot_tour(tour: Tour, *, storey: int | None = None, ax: Axes | None = None, 
     return ax
 
 
-def _parts_of(tour: Tour, level: float) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """Return the parts of a tour that lie at a level, and those that leave it or come to it, (n, 2) metres."""
+def _draw_way(ax: Axes, tour: Tour, level: float, color: str) -> bool:
+    """Draw what of a tour lies at a level, with its direction; tell whether it leaves the level or comes to it."""
     parts = [parts_at(leg, level) for leg in tour.route]
-    return [piece for flat, _ in parts for piece in flat], [piece for _, climbs in parts for piece in climbs]
+    pieces = [piece for flat, _ in parts for piece in flat]
+    climbs = [piece for _, steep in parts for piece in steep]
+    ax.add_collection(LineCollection(pieces, colors=color, linewidths=1.8, zorder=6, capstyle="round"))
+    ax.add_collection(LineCollection(climbs, colors=color, linewidths=1.8, zorder=6, linestyles=":"))
+    for piece in pieces:
+        draw_arrow(ax, piece, color)
+    return bool(climbs)
+
+
+def _draw_start(ax: Axes, tour: Tour, color: str) -> None:
+    ax.plot(*tour.start_point[:2], "s", color=color, markersize=9, markeredgecolor="white", zorder=8)
 
 
 def figure_bytes(draw: Callable[[Axes], object], *, size: tuple[float, float] = (7.0, 5.0)) -> bytes:
