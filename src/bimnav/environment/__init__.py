@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from bimnav import _checks
 from bimnav._door_access import door_access
 from bimnav._floors import FLOOR_SOURCES, FloorSource, find_floors
 from bimnav._meaning import what_blocks
@@ -21,7 +22,6 @@ from bimnav.environment._values import (
     Zone,
     grown as grown,
 )
-from bimnav.errors import InputError
 from bimnav.robot import Robot
 
 if TYPE_CHECKING:
@@ -64,10 +64,12 @@ def make_environment(
         Whether the ground around the building is floor too: slabs and terrain as high as a level, else a
         margin of two metres around the lowest level with a door to the outside.
     """
-    from bimnav.tasks import choose, lint_rules
+    from bimnav.tasks import Task, choose, lint_rules
 
     robot = robot or Robot()
-    _check_kinds(building, task, robot)
+    _checks.need("building", building, Building)
+    _checks.need("task", task, Task)
+    _checks.need("robot", robot, Robot)
     floors, issues = find_floors(building, robot, sources=floor_from, outdoors=outdoors)
     issues += lint_rules(task, building)
     levels = tuple(floor.level for floor in floors)
@@ -111,18 +113,6 @@ def make_environment(
         issues += (Issue("target-without-shape", message, lost, "error", "Ask for an export with bodies."),)
     exits = (target_of(choice, environment) for choice in choose(task, "exits", building)[0].values())
     return replace(environment, targets=targets, exits=tuple(way for way in exits if way is not None), issues=issues)
-
-
-def _check_kinds(building: object, task: object, robot: object) -> None:
-    from bimnav.tasks import Task
-
-    for name, value, kind, maker in (
-        ("building", building, Building, "read_ifc"),
-        ("task", task, Task, "load_task"),
-        ("robot", robot, Robot, "Robot or load_robot"),
-    ):
-        if not isinstance(value, kind):
-            raise InputError(f"{name} is {value!r:.80}, not a {kind.__name__}.", f"Make it with {maker}.")
 
 
 def _targets(
