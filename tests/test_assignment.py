@@ -229,3 +229,30 @@ def test_the_sample_apartment_is_cleaned_by_two_robots_without_leaving_a_spill()
     served = sorted(stop.global_id for tour in plan.tours for stop in tour.stops)
     assert served == sorted(target.global_id for target in environment.targets)
     assert all(bn.check_plan(tour).ok for tour in plan.tours)
+
+
+def test_who_makes_haste_takes_the_fast_order_and_not_the_cheap_one():
+    factor = np.ones((1, 9))
+    factor[0, :3] = 5  # the way to the left is short and dear
+    graph = NavGraph.from_mask(np.ones((1, 9), bool)).with_cost(factor)
+    stops = [
+        Stop(name, name, cell, graph.frame.center_of(cell), graph.frame.center_of(cell), service_time=0.0)
+        for name, cell in (("left", Cell(0, 0, 0)), ("right", Cell(0, 0, 8)))
+    ]
+    plans = {how: plan_tours(graph, [Cell(0, 0, 3)], stops, objective=how) for how in ("makespan", "total")}
+    assert [stop.name for stop in plans["makespan"].tours[0].stops] == ["left", "right"]
+    assert [stop.name for stop in plans["total"].tours[0].stops] == ["right", "left"]
+    for plan in plans.values():
+        assert plan.is_optimal
+    assert plans["makespan"].lower_bound == plans["makespan"].length / Robot().speed
+
+
+def test_a_team_that_obeys_priorities_does_not_claim_the_optimum_without_them():
+    graph = NavGraph.from_mask(np.ones((1, 9), bool))
+    stops = [
+        Stop(n, n, cell, graph.frame.center_of(cell), graph.frame.center_of(cell), service_time=0.0, priority=rank)
+        for n, cell, rank in (("near", Cell(0, 0, 2), 0.0), ("far", Cell(0, 0, 8), 1.0))
+    ]
+    plan = plan_tours(graph, [Cell(0, 0, 0)], stops)
+    assert [stop.name for stop in plan.tours[0].stops] == ["far", "near"]
+    assert not plan.is_optimal

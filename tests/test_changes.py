@@ -187,3 +187,14 @@ def test_what_stands_in_the_way_since_repels_like_what_stood_there_before():
     assert_equal(twice, rooms().block([cell]).with_clearance(0.8).with_clearance(0.4, 2.0))
     assert twice.clearances == ((0.8, 4.0), (0.4, 2.0))
     assert_equal(twice.with_cost(1.0), rooms().block([cell]))
+
+
+def test_a_cost_given_to_a_target_without_floor_outlasts_changes_on_top_of_it():
+    environment = bn.make_environment(
+        bn.read_ifc(bn.sample("apartment")), bn.load_task("cleaning"), bn.Robot(radius=0.25)
+    )
+    graph = bn.build_graph(environment, cell_size=0.2, on_conflict="reach")
+    cell = next(c.cell for c in graph.conflicts if not graph.floor[c.cell])
+    dear, crate = np.full(graph.frame.shape, 3.0), shapely.box(*graph.frame.box_of(cell))
+    before, after = graph.with_cost(dear).with_obstacle(crate), graph.with_obstacle(crate).with_cost(dear)
+    assert before.cost[cell] == after.cost[cell] == 3

@@ -161,3 +161,16 @@ def test_a_group_without_a_way_to_it_is_refused():
     cost[:, 2:] = math.inf
     with pytest.raises(NoPathError):
         order_stops(cost, groups=[0, 1, 2, 2])
+
+
+def test_no_order_that_breaks_priorities_is_taken_where_none_keeps_them():
+    matrix = [[0, 1, math.inf], [1, 0, 1], [1, 1, 0]]
+    assert order_stops(matrix, return_to_start=True).order == (0, 1, 2)
+    with pytest.raises(NoPathError):
+        order_stops(matrix, return_to_start=True, priority=[0, 0, 1])
+
+
+def test_a_due_time_of_an_end_is_refused_and_not_forgotten():
+    with pytest.raises(InputError, match="row 1, is due"):
+        order_stops([[0, 9, 1], [9, 0, 2], [1, 2, 0]], end=1, due=[math.inf, 1.0, math.inf])
+    assert order_stops([[0, 9, 1], [9, 0, 2], [1, 2, 0]], due=[0.0, math.inf, math.inf]).order == (0, 2, 1)

@@ -9,6 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import bimnav as bn
 from bimnav.errors import NoPathError, NothingWalkableError
+from bimnav.plan.paths import smooth_path
 from bimnav.testing import assert_valid_path, two_rooms, two_storeys
 from tests.conftest import real_model
 
@@ -87,7 +88,8 @@ def test_a_change_beside_the_way_needs_no_search():
     robot, graph = replanner()
     before = robot.path
     found = robot.update(graph.with_obstacle(shapely.box(0.4, 3.0, 0.8, 3.6)))
-    assert (found.path, found.is_changed, found.searched) == (before, False, False)
+    assert (found.path.cells, found.path.cost) == (before.cells, before.cost)
+    assert (found.is_changed, found.searched) == (False, False)
 
 
 def test_a_closed_door_ends_the_route_and_an_open_one_brings_it_back():
@@ -170,3 +172,13 @@ def test_a_replanner_shows_where_it_leads():
     assert repr(robot) == f"Replanner({bn.Cell(0, 0, 0)} to {bn.Cell(0, 0, 3)}, 4 cells, 3.000 m)"
     robot.update(graph.block([bn.Cell(0, 0, 2)]))
     assert repr(robot).endswith("no route now)")
+
+
+def test_a_way_that_stays_as_it_was_is_drawn_straight_past_what_is_new():
+    graph = bn.NavGraph.from_mask(np.ones((12, 12), bool), connectivity=4)
+    robot = bn.Replanner(graph, bn.Cell(0, 0, 0), bn.Cell(0, 11, 11))
+    crate = shapely.box(5.2, 5.2, 6.8, 6.8)
+    assert not shapely.LineString(robot.path.waypoints[:, :2]).intersects(crate)
+    found = robot.update(graph.with_obstacle(crate))
+    assert not found.is_changed
+    assert not shapely.LineString(smooth_path(found.path).waypoints[:, :2]).intersects(crate)

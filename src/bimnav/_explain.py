@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import shapely
 
+from bimnav import _checks
 from bimnav._floors import NEAR
 from bimnav.building import Building, Element, Space, product_of
 from bimnav.errors import GridError, ModelError
@@ -250,6 +251,7 @@ def explain_cell(graph: NavGraph, cell: Cell) -> CellExplanation:
     GridError
         If the graph has no such cell.
     """
+    cell = Cell(*_checks.cell("cell", cell))
     if cell not in graph.frame:
         raise GridError(f"{cell} is not a cell of a frame of shape {graph.frame.shape}.")
     environment, box = graph.environment, graph.frame.box_of(cell)

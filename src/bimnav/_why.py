@@ -102,10 +102,16 @@ def why_unreachable(graph: NavGraph, start: Cell, goal: Cell) -> NoRoute | None:
     -------
     why
         None if a route leads there.
+
+    Raises
+    ------
+    OutsideMapError
+        If a cell is not one of the graph's.
     """
     _checks.need("graph", graph, NavGraph)
+    start, goal = Cell(*_checks.cell("start", start)), Cell(*_checks.cell("goal", goal))
     for role, cell in (("start", start), ("goal", goal)):
-        if Cell(*_checks.cell(role, cell)) not in graph.frame:
+        if cell not in graph.frame:
             raise OutsideMapError(f"{role} {cell} lies outside the map.", "`graph.frame.cell_at` finds cells.")
     if graph.components[start] == graph.components[goal] and graph.free[start]:
         return None

@@ -151,7 +151,10 @@ class NavGraph:
         connectors
             Ways between storeys.
         """
-        mask = np.asarray(free, dtype=np.bool_)
+        given = np.asarray(free)
+        if given.dtype.kind == "f" and np.isnan(given).any():
+            raise GridError("the mask holds a NaN.", "Say for each cell whether it is free.")
+        mask = given.astype(np.bool_)
         if mask.ndim == 2:
             mask = mask[None]
         if mask.ndim != 3 or not mask.size:
@@ -406,7 +409,7 @@ class NavGraph:
     def _storey(self, storey: int | str) -> int:
         storeys = self.environment.storeys if self.environment else ()
         names = (k for k, known in enumerate(storeys) if storey in (known.name, known.global_id))
-        index = storey if isinstance(storey, int) else next(names, -1)
+        index = int(storey) if isinstance(storey, (int, np.integer)) else next(names, -1)
         if not 0 <= index < len(self.frame.elevations):
             raise ValueRangeError(
                 f"storey is {storey!r}.", f"Give an index below {len(self.frame.elevations)} or a name."
@@ -430,7 +433,8 @@ class NavGraph:
         cost, obstacle, changes, cells = changed_arrays(bare, self.obstacle, before, blocked, placed, kept)
         for cell in reached:  # one that no floor carries, as when it is cut
             if environment is not None and not self.floor[cell] and indexes_of([cell], self.frame)[0] in kept:
-                cost[cell] = zone_factor(self.frame, environment, cell)
+                known = float(bare[cell])
+                cost[cell] = known if math.isfinite(known) else zone_factor(self.frame, environment, cell)
         graph = replace(
             self,
             **self._costs(_frozen(cost), self.clearances),
@@ -478,7 +482,11 @@ class NavGraph:
         factor : anything that fits (storeys, rows, cols)
             Multiplier of the length of a step, at least 1; inf closes a cell.
         """
-        factors = _checks.numbers("factor", factor).astype(np.float32)
+        exact = _checks.numbers("factor", factor)
+        with np.errstate(over="ignore"):
+            factors = exact.astype(np.float32)
+        if (np.isinf(factors) & np.isfinite(exact)).any():
+            raise ValueRangeError("a cost is above 3.4e38.", "Give less, or inf to close a cell.")
         try:
             given = np.broadcast_to(factors, self.frame.shape)
         except ValueError as error:

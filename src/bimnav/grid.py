@@ -154,7 +154,10 @@ class GridFrame:
         return (
             isinstance(cell, tuple)
             and len(cell) == 3
-            and all(0 <= index < size for index, size in zip(cell, self.shape, strict=True))
+            and all(
+                isinstance(index, (int, np.integer)) and 0 <= index < size
+                for index, size in zip(cell, self.shape, strict=True)
+            )
         )
 
     def storey_at(self, z: float | None) -> int:

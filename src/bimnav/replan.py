@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -107,7 +107,7 @@ class Replanner:
         before, ahead = self.graph, self._ahead(at)
         self.graph, self.at = graph, self.at if at is None else at
         if ahead is not None and self._still_holds(before, graph, ahead):
-            self.path = ahead
+            self.path = ahead = replace(ahead, graph=graph)  # who draws it straight must heed what is new
             return Replan(ahead, False, "the way ahead is as it was")
         try:
             found = find_path(graph, self.at, self.goal)

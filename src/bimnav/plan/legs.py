@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bimnav.plan.paths import find_path
+from bimnav.plan.paths import Path, find_path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bimnav.grid import Cell
     from bimnav.robot import Robot
 
-__all__ = ["Legs", "legs_between"]
+__all__ = ["Legs", "legs_between", "seconds_along"]
 
 
 class Legs(NamedTuple):
@@ -49,7 +49,12 @@ def legs_between(graph: NavGraph, cells: Sequence[Cell], cost: NDArray[np.float6
         if a != b:
             path = find_path(graph, cells[a], cells[b])
             metres[a, b] = path.length
-            on_links = sum(link.length for _, link in path.rides)
-            seconds[a, b] = (path.length - on_links) / robot.speed
-            seconds[a, b] += sum(graph.seconds_over(link, robot) for _, link in path.rides)
+            seconds[a, b] = seconds_along(path, robot)
     return Legs(metres, seconds)
+
+
+def seconds_along(path: Path, robot: Robot) -> float:
+    """Return how long a robot is on a path at its speed, rides included."""
+    on_links = sum(link.length for _, link in path.rides)
+    rides = sum(path.graph.seconds_over(link, robot) for _, link in path.rides)
+    return (path.length - on_links) / robot.speed + rides

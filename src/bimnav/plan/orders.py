@@ -87,7 +87,8 @@ def order_stops(
         Rows with a higher one are all visited before those with a lower one. Where stops are due, it says
         which to keep if not all can be.
     due : (n,) float
-        The most that may have been spent, on the way and in service, when a row has been served; inf for any.
+        The most that may have been spent, on the way and in service, when a row has been served; inf for any,
+        as for the end.
     service : (n,) float
         What is spent at a row, at least 0.
     time_limit
@@ -124,6 +125,9 @@ def order_stops(
     spent[start] = 0.0
     cost = cost + spent  # paid on the way in
     np.fill_diagonal(cost, 0.0)
+    latest[start] = math.inf
+    if end is not None and math.isfinite(latest[end]):
+        raise InputError(f"the end, row {end}, is due.", "Give dues to stops; a tour ends when it ends.")
     if np.isfinite(latest).any():
         found = _order_by_due(cost, ways, start, end, return_to_start, latest, ranks, time_limit)
     elif len(set(ranks.tolist())) > 1:

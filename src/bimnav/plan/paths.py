@@ -257,7 +257,7 @@ def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[n
     graph
         Graph to search.
     sources
-        One free cell or several.
+        One free cell, also as three plain numbers, or several.
 
     Returns
     -------
@@ -277,7 +277,9 @@ def distance_field(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[n
 def source_indexes(graph: NavGraph, sources: Cell | Iterable[Cell]) -> NDArray[np.int64]:
     """Return the flat indexes of free cells, at least one."""
     _checks.need("graph", graph, NavGraph)
-    cells = (sources,) if isinstance(sources, Cell) else _checks.many("sources", sources)
+    cells: tuple[Any, ...] = _checks.many("sources", sources)
+    if len(cells) == 3 and all(np.ndim(value) == 0 for value in cells):  # a cell, as plain numbers
+        cells = (cells,)
     if not cells:
         raise InputError("a distance field needs a source.", "Give at least one free cell.")
     return np.array([free_index(graph, cell, "start") for cell in cells])
@@ -368,6 +370,7 @@ def free_index(graph: NavGraph, cell: Cell, role: Literal["start", "goal"]) -> i
     index = _index(graph, cell, role)
     if graph.cost.item(index) == math.inf:
         error = StartBlockedError if role == "start" else GoalBlockedError
+        cell = Cell(*_checks.cell(role, cell))
         raise error(f"{role} {cell} is blocked.", _nearest_free(graph, cell), {role: tuple(cell)})
     return index
 

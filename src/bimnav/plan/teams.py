@@ -14,13 +14,15 @@ from bimnav.errors import InputError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 from bimnav.plan.assignment import Objective, assign_stops
-from bimnav.plan.legs import legs_between
+from bimnav.plan.legs import legs_between, seconds_along
 from bimnav.plan.paths import Algorithm, distance_matrix, free_index
-from bimnav.plan.tours import Tour, explained, near_stands, plan_tour, seconds_at, why_unreached
+from bimnav.plan.tours import Tour, explained, near_stands, seconds_at, tour_over, why_unreached
 from bimnav.robot import Robot
 from bimnav.stops import Stand, Stop, Unreached, given_up
 
 __all__ = ["TeamPlan", "plan_tours"]
+
+_ROUNDING = 1e-9  # relative
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,6 +137,7 @@ def plan_tours(
     chargers = None if chargers is None else _checks.many("chargers", chargers, Stop)
     for start in starts:
         free_index(graph, start, "start")
+    starts = [Cell(*_checks.cell("start", start)) for start in starts]
     if robots is None:
         one = Robot() if graph.environment is None else graph.environment.robot
         robots = [replace(one, name=f"R{k + 1}") for k in range(len(starts))]
@@ -170,7 +173,7 @@ def plan_tours(
     for k, (robot, route) in enumerate(zip(robots, shares.routes, strict=True)):
         own = [work.stands[row - len(starts)][0] for row in route[1:]]
         tours.append(
-            plan_tour(
+            tour_over(
                 graph,
                 starts[k],
                 own,
@@ -179,10 +182,22 @@ def plan_tours(
                 start_point=points[k],
                 robot=robot,
                 chargers=chargers,
+                is_timed=objective == "makespan",
             )
         )
     unreached += [lost for tour in tours for lost in tour.unreached]
-    return TeamPlan(tuple(robots), tuple(tours), objective, shares.bound, shares.is_optimal, tuple(unreached))
+    needed = [_needed(tour, robot, objective) for tour, robot in zip(tours, robots, strict=True)]
+    reached = math.fsum(needed) if objective == "total" else max(needed)
+    is_optimal = shares.is_optimal and reached <= shares.bound * (1 + _ROUNDING)  # priorities, dues, charging
+    return TeamPlan(tuple(robots), tuple(tours), objective, shares.bound, is_optimal, tuple(unreached))
+
+
+def _needed(tour: Tour, robot: Robot, objective: Objective) -> float:
+    """Return what a tour costs, or for `makespan` how long it takes with service, seconds."""
+    if objective == "total":
+        return tour.cost
+    driven = math.fsum(seconds_along(leg, robot) for leg in tour.legs)
+    return driven + math.fsum(seconds_at(tour.graph, stop) for stop in tour.stops)
 
 
 class _Work(NamedTuple):

@@ -34,7 +34,7 @@ from bimnav.robot import Robot
 from bimnav.smooth import turns_of
 from bimnav.stops import Stand, Stop, Unreached, given_up
 
-__all__ = ["Tour", "find_chargers", "near_stands", "plan_tour", "seconds_at", "why_unreached"]
+__all__ = ["Tour", "find_chargers", "near_stands", "plan_tour", "seconds_at", "tour_over", "why_unreached"]
 
 Point: TypeAlias = tuple[float, float, float]
 
@@ -217,6 +217,43 @@ def plan_tour(
     InputError
         If the tour should both end elsewhere and return, or has a point to end at and no cell.
     """
+    return tour_over(
+        graph,
+        start,
+        stops,
+        algorithm=algorithm,
+        smooth=smooth,
+        return_to_start=return_to_start,
+        end=end,
+        start_point=start_point,
+        end_point=end_point,
+        robot=robot,
+        chargers=chargers,
+    )
+
+
+def tour_over(
+    graph: NavGraph,
+    start: Cell,
+    stops: Iterable[Stop] | None = None,
+    *,
+    algorithm: Algorithm = "auto",
+    smooth: Smooth | None = None,
+    return_to_start: bool = False,
+    end: Cell | None = None,
+    start_point: Point | None = None,
+    end_point: Point | None = None,
+    robot: Robot | None = None,
+    chargers: Iterable[Stop] | None = None,
+    is_timed: bool = False,
+) -> Tour:
+    """Plan a tour as `plan_tour` does.
+
+    Parameters
+    ----------
+    is_timed
+        Whether the order is to take little time although nothing is due.
+    """
     _checks.need("graph", graph, NavGraph)
     _checks.need("robot", robot, Robot, or_none=True)
     stops = None if stops is None else _checks.many("stops", stops, Stop)
@@ -227,7 +264,9 @@ def plan_tour(
     end_point = None if end_point is None else _checks.point("end_point", end_point)
     if end is None and end_point is not None:
         raise InputError("a tour has an end_point and no end.", "Give its cell, too: graph.frame.cell_at(x, y).")
+    start = Cell(*_checks.cell("start", start))
     if end is not None:
+        end = Cell(*_checks.cell("end", end))
         if return_to_start and end != start:
             raise InputError("a tour cannot both end elsewhere and return.", "Give end or return_to_start, not both.")
         free_index(graph, end, "goal")
@@ -248,7 +287,7 @@ def plan_tour(
             due = math.inf if stop.due is None else stop.due
             found.setdefault((cells, stop.priority, due), []).append(stop)
     unreached = explained(graph, start, unreached)
-    ordered = _ordered(graph, start, end, list(found.items()), robot, return_to_start)
+    ordered = _ordered(graph, start, end, list(found.items()), robot, return_to_start, is_timed)
     for stop in ordered.late:
         reason = f"it cannot be done within {stop.due:g} s of the start"
         unreached.append(given_up(stop, reason))
@@ -313,8 +352,15 @@ def _ordered(
     found: Sequence[tuple[tuple[Any, ...], list[Stop]]],
     robot: Robot,
     return_to_start: bool,
+    is_timed: bool,
 ) -> _Ordered:
-    """Order stops, given by the cells they can be served from, their priority and when they are due."""
+    """Order stops, given by the cells they can be served from, their priority and when they are due.
+
+    Parameters
+    ----------
+    is_timed
+        Whether to make time least although nothing is due.
+    """
     cells = [start] if end is None else [start, end]
     group = list(range(len(cells)))
     columns: list[tuple[float, float, float]] = [(0.0, math.inf, 0.0)] * len(cells)
@@ -324,7 +370,7 @@ def _ordered(
         columns += [(priority, due, sum(seconds_at(graph, stop) for stop in stops))] * len(places)
     priority, due, service = np.array(columns).T
     cost = distance_matrix(graph, cells)
-    is_timed = bool(np.isfinite(due).any())
+    is_timed = is_timed or bool(np.isfinite(due).any())
     spent = legs_between(graph, cells, cost, robot).seconds if is_timed else cost
     order = order_stops(
         spent,

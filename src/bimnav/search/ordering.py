@@ -101,8 +101,9 @@ def order_few(
     total = best + trip[1:, 0]
     visited = 2**stops - 1
     if not np.isfinite(total[visited]).any():
-        if np.isinf(due).all():  # there is no way; any order says so by its length
-            return np.array([0, *(np.flatnonzero(group == g)[0] + 1 for g in range(stops))])
+        if np.isinf(due).all():  # there is no way; any order that may be says so by its length
+            rising = np.argsort(before, kind="stable")  # of what goes before, one set holds the other
+            return np.array([0, *(np.flatnonzero(group == g)[0] + 1 for g in rising)])
         bits = np.arange(2**stops)[:, None] >> np.arange(stops) & 1
         worth = bits @ (np.ones(stops) if weight is None else weight)
         least = total.min(axis=1)
