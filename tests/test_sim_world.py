@@ -651,6 +651,17 @@ def test_who_waits_in_vain_for_floor_that_is_thinner_than_a_cell_gives_up(deep):
     assert given_up.time < 60
 
 
+def test_who_stands_beside_floor_in_use_and_wants_to_a_stop_just_inside_gives_up():
+    parts = [Passage("west", shapely.box(8, -1, 14, 11)), Passage("middle", shapely.box(14, -1, 17, 11))]
+    keeps = tour_in(HALL, Cell(0, 2, 0), Cell(0, 2, 8), prefix="a")
+    comes = tour_in(HALL, Cell(0, 9, 30), Cell(0, 9, 15), Cell(0, 9, 13), prefix="b")
+    fleet = [Robot("A", speed=5.0), Robot("B", speed=1.0)]
+    result = simulate([keeps, comes], robots=fleet, passages=parts, patience=20.0, until=1000.0)
+    (given_up,) = rows(result, "give_up", robot="B")
+    assert (given_up.target, given_up.cause) == ("b1", "west, in use closes the way for 20 s")
+    assert given_up.time < 100
+
+
 def test_a_line_that_meets_an_area_only_by_a_rounding_does_not_cross_it():
     from bimnav.sim.areas import _inside
 

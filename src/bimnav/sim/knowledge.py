@@ -107,7 +107,7 @@ class Knowledge:
                 continue
             body = closure.body(robot).buffer(-_TOUCH)
             line = shapely.LineString(points[:, :2]) if len(points) > 1 else shapely.Point(points[0, :2])
-            leeway = 0.0 if closure.is_held else self.leeway
+            leeway = None if closure.is_held else self.leeway
             if shapely.intersects(line, body) and _stops_at(points, storeys, closure.storey, body, leeway):
                 return closure
         return None
@@ -131,12 +131,12 @@ class Knowledge:
 
 
 def _stops_at(
-    points: NDArray[np.float64], storeys: NDArray[np.int32], storey: int, body: BaseGeometry, leeway: float
+    points: NDArray[np.float64], storeys: NDArray[np.int32], storey: int, body: BaseGeometry, leeway: float | None
 ) -> bool:
-    """Tell whether a line meets a polygon on a storey, but for a short way out of it at the begin."""
+    """Tell whether a line meets a polygon on a storey, but for a short way out of it at the begin; None for no way."""
     found = crossings(points, storeys, [(body, storey)])
     here = shapely.Point(points[0, :2])
-    if found and found[0].begin == 0 and body.covers(here):
+    if leeway is not None and found and found[0].begin == 0 and body.covers(here):
         way_out = float(body.boundary.distance(here))
         return len(found) > 1 or found[0].end > 2 * way_out + leeway
     return bool(found) or (len(points) == 1 and bool(body.covers(here)))
