@@ -25,9 +25,9 @@ from bimnav.sim.log import Event, EventLog
 from bimnav.sim.passages import find_passages
 from bimnav.sim.people import Person
 from bimnav.sim.result import SimResult, Tally
+from bimnav.sim.setting import Charger, Policy, ServiceTime
 from bimnav.sim.simulation import simulate
 from bimnav.sim.track import RobotState, RobotStatus, Track
-from bimnav.sim.world import Charger, Policy, ServiceTime
 
 __all__ = [
     "Chance",

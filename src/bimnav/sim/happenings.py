@@ -11,7 +11,6 @@ import simpy
 from bimnav._approach import stop_for
 from bimnav.environment import Target
 from bimnav.errors import BimnavError, ModelError, ValueRangeError
-from bimnav.sim.agents import Order
 from bimnav.sim.changes import (
     Change,
     DoorLocks,
@@ -23,8 +22,11 @@ from bimnav.sim.changes import (
     TargetReported,
     ZoneHazardous,
 )
+from bimnav.sim.dispatch import assign
 from bimnav.sim.doors import DoorState, SimDoor
+from bimnav.sim.errands import Order
 from bimnav.sim.knowledge import Closure
+from bimnav.sim.refuge import is_inside
 from bimnav.sim.track import RobotStatus
 from bimnav.stops import Stop, Unreached
 
@@ -128,7 +130,7 @@ def _(change: TargetReported, world: World) -> None:
     world.targets.append(global_id)
     world.note("change", "a new target is reported", **named)  # type: ignore[arg-type]
     stop, reason = _stop_for(change, global_id, world)
-    if stop is None or not world.assign(stop):
+    if stop is None or not assign(world, stop):
         reason = reason or "no robot that works can get there"
         world.note("unreached", reason, **named)  # type: ignore[arg-type]
         world.unreached.append(Unreached(global_id, change.name, (change.x, change.y, 0.0), reason))
@@ -161,7 +163,7 @@ def _(change: ZoneHazardous, world: World) -> None:
     world.note("change", f"{change.name} begins", place=(*_middle(change), change.storey))
     world.close(zone)
     for agent in world.agents:
-        if agent.status is not RobotStatus.FAILED and world.is_inside(agent, zone):
+        if agent.status is not RobotStatus.FAILED and is_inside(agent, zone):
             agent.disturb(Order("leave", change.name, closure=zone))
 
 

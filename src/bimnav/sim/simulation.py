@@ -14,16 +14,18 @@ from bimnav import _checks
 from bimnav.errors import InputError, ValueRangeError
 from bimnav.plan.tours import find_chargers
 from bimnav.robot import Robot
-from bimnav.sim.agents import Order, RobotAgent
+from bimnav.sim.agents import RobotAgent
 from bimnav.sim.areas import Passage, SpeedLimit
 from bimnav.sim.changes import Change, Sensing
 from bimnav.sim.doors import DoorState, SimDoor, doors_in
+from bimnav.sim.errands import Order
 from bimnav.sim.happenings import doors_named, plan_changes
 from bimnav.sim.lifts import Lift
 from bimnav.sim.log import Event, EventLog
 from bimnav.sim.people import Person, Walker
 from bimnav.sim.result import SimResult, Tally
-from bimnav.sim.world import LATEST, Charger, Decision, Policy, ServiceTime, Setting, Speed, World
+from bimnav.sim.setting import Charger, Decision, Policy, ServiceTime, Setting, Speed
+from bimnav.sim.world import LATEST, World
 
 if TYPE_CHECKING:
     from collections.abc import Callable
