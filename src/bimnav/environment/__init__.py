@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from bimnav import _checks
 from bimnav._door_access import door_access
@@ -16,7 +16,6 @@ from bimnav.environment._targets import embodied, target_at, target_of
 from bimnav.environment._values import (
     IndoorEnvironment,
     Obstacle,
-    Place,
     Region,
     Target,
     Zone,
@@ -28,6 +27,9 @@ if TYPE_CHECKING:
     from bimnav.tasks import Choice, Overruled, Task
 
 __all__ = ["IndoorEnvironment", "Obstacle", "Place", "Region", "Target", "Zone", "make_environment", "rules_overruled"]
+
+Place: TypeAlias = Sequence[Any]
+"""`(x, y)` or `(x, y, storey)`: metres, and the name, GlobalId or index of a storey."""
 
 
 def make_environment(

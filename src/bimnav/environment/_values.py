@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 import shapely
@@ -21,12 +21,10 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from bimnav._explain import Explanation
+    from bimnav.environment import Place
     from bimnav.tasks import Destination, Overruled, Task
 
-__all__ = ["IndoorEnvironment", "Obstacle", "Place", "Region", "Target", "Zone", "grown"]
-
-Place: TypeAlias = Sequence[Any]
-"""`(x, y)` or `(x, y, storey)`: metres, and the name, GlobalId or index of a storey."""
+__all__ = ["IndoorEnvironment", "Obstacle", "Region", "Target", "Zone", "grown"]
 
 _GAP = 0.05  # metres; floors up to twice as far apart, such as a space and a doorway, are one floor
 _QUARTER = 16  # segments of a quarter circle in a buffer
