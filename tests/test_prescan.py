@@ -27,15 +27,20 @@ from bimnav.errors import (
     InputError,
 )
 from bimnav.ifc import _prescan, _survey, _text
-from bimnav.ifc._prescan import prescan, scan
+from bimnav.ifc._prescan import Prescan, scan
+from bimnav.ifc._text import load
 from tests.conftest import REAL_IFC, real_model
 from tests.ifc_text import FRAME, box, model, product
 
 REAL_MODELS = sorted(path.relative_to(REAL_IFC).as_posix() for path in REAL_IFC.glob("*/*.ifc*"))
 
 
-def scanned(text: str) -> _prescan.Prescan:
+def scanned(text: str) -> Prescan:
     return scan(text.encode(), "model.ifc")
+
+
+def prescan(path: Path) -> Prescan:
+    return scan(load(path), path.name)
 
 
 def refusal(kind: type[BimnavError], text: str | bytes, *words: str) -> BimnavError:

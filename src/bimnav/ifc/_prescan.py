@@ -10,7 +10,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -25,9 +24,8 @@ from bimnav.errors import (
     IfcTruncatedError,
     IfcUnitsError,
 )
-from bimnav.ifc._text import load
 
-__all__ = ["DEPTH_LIMIT", "REFERENCES_UP_TO", "SCHEMAS", "Prescan", "prescan", "scan"]
+__all__ = ["DEPTH_LIMIT", "REFERENCES_UP_TO", "SCHEMAS", "Prescan", "scan"]
 
 SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3_ADD2")
 """Schemas that are read, as the kernel names them."""
@@ -112,11 +110,6 @@ class Prescan:
     def products(self) -> dict[str, int]:
         """Class name in capitals to the number of its instances that have a representation."""
         return dict(sorted(Counter(kind for kind, _ in self.shaped.values()).items()))
-
-
-def prescan(path: Path, *, beat: Callable[[int, int], None] | None = None) -> Prescan:
-    """Read a model's text and scan it; see `load` and `scan`."""
-    return scan(load(path), path.name, beat=beat)
 
 
 def scan(text: bytes, name: str, *, beat: Callable[[int, int], None] | None = None) -> Prescan:
