@@ -115,23 +115,15 @@ def _building(
     """Return the elements, their triangles sorted by storey and category, and the lowest corner of all."""
     if building is None or environment is None:
         return [], {"positions": "", "indices": "", "scale": [1, 1, 1], "groups": [], "boxed": 0}, np.zeros(3)
-    products = {door.global_id: door.element for door in building.doors}
-    products = {e.global_id: e for e in building.elements} | {g: e for g, e in products.items() if e is not None}
-    shown = [e for e in products.values() if e.shapes]
-    boxed = _too_fine(shown)
+    shown = _shown(building, elevations)
+    boxed = _too_fine([element for _, _, element in shown])
     roles, rules = _roles(environment)
-    rows = []
-    for element in shown:
-        category = _category(element.ifc_class, element.predefined_type)
-        rows.append((_level_of(element, category, elevations), category, element))
-    order = {name: k for k, name in enumerate([*_CATEGORIES, "other"])}
-    rows.sort(key=lambda row: (row[0], order[row[1]], row[2].global_id))
     vertices: list[NDArray[np.float64]] = []
     triangles: list[NDArray[np.int64]] = []
     elements: list[dict[str, Any]] = []
     groups: list[dict[str, Any]] = []
     base = first = 0
-    for level, category, element in rows:
+    for level, category, element in shown:
         count = 0
         for points, faces in _triangles(element, element.global_id in boxed):
             vertices.append(points)
@@ -166,6 +158,19 @@ def _building(
         "boxed": len(boxed),
     }
     return elements, mesh, low
+
+
+def _shown(building: Building, elevations: Sequence[float]) -> list[tuple[int, str, Element]]:
+    """Return everything with a shape, sorted by level and category."""
+    products = {element.global_id: element for element in building.elements}
+    products |= {door.global_id: door.element for door in building.doors}
+    rows = []
+    for element in products.values():
+        if element.shapes:
+            category = _category(element.ifc_class, element.predefined_type)
+            rows.append((_level_of(element, category, elevations), category, element))
+    order = {name: k for k, name in enumerate([*_CATEGORIES, "other"])}
+    return sorted(rows, key=lambda row: (row[0], order[row[1]], row[2].global_id))
 
 
 def _too_fine(elements: Sequence[Element]) -> set[str]:
