@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav._kept import Kept
 from bimnav.grid import GridFrame, rasterize
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ _NO_CELLS = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class Placed(Kept):
     """Something that stands in the way since, and the cells, as flat indexes, that it closes."""
 
     obstacle: Obstacle
@@ -35,7 +36,7 @@ class Placed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Changes:
+class Changes(Kept):
     """What has been closed, and what its cells were like before.
 
     Parameters

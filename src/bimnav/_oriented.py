@@ -18,6 +18,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bimnav import _checks, search
+from bimnav._kept import Kept
 from bimnav.errors import (
     GoalBlockedError,
     InputError,
@@ -42,7 +43,7 @@ _PARTS = 4  # of an eighth of a turn; the swept hull stands out by less than hal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PosePath:
+class PosePath(Kept):
     """A motion of a body that drives straight and turns on the spot.
 
     Parameters

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bimnav import _checks
+from bimnav._kept import Kept
 from bimnav.errors import GoalBlockedError, NoPathError, OutsideMapError, StartBlockedError
 from bimnav.grid import Cell
 from bimnav.smooth import shorten_points
@@ -26,7 +27,7 @@ _BLOCKED = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AdaptivePath:
+class AdaptivePath(Kept):
     """A path over squares of different sizes, drawn straight.
 
     Parameters
@@ -48,7 +49,7 @@ class AdaptivePath:
 
 
 @dataclass(frozen=True, eq=False)
-class AdaptiveGraph:
+class AdaptiveGraph(Kept):
     """Squares of free cells: each as large as it can be, and one cell large at targets and obstacles.
 
     Parameters

@@ -14,6 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bimnav._indoors import part_in
+from bimnav._kept import Kept
 from bimnav.environment import grown
 from bimnav.errors import ValueRangeError
 from bimnav.grid import Cell, GridFrame
@@ -40,7 +41,7 @@ _NO_POINTS = np.empty((0, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Link:
+class Link(Kept):
     """A way between cells of two storeys, open in both directions.
 
     Parameters

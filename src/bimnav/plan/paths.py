@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bimnav import _checks, search
+from bimnav._kept import Kept
 from bimnav._progress import Display, Progress
 from bimnav._why import why_unreachable
 from bimnav.errors import (
@@ -61,7 +62,7 @@ _written: WeakKeyDictionary[NavGraph, rustworkx.PyGraph[int, float]] = WeakKeyDi
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Path(Kept):
     """A walk over neighboring cells, and over connectors from storey to storey.
 
     Parameters

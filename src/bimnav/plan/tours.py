@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bimnav import _checks
+from bimnav._kept import Kept
 from bimnav._why import why_unreachable
 from bimnav.errors import InputError
 from bimnav.graph import NavGraph
@@ -45,7 +46,7 @@ _DOCK = 3.0  # metres from a dock at which a robot charges
 
 
 @dataclass(frozen=True, eq=False)
-class Tour:
+class Tour(Kept):
     """Stops in the order of visiting, and the way from each to the next.
 
     Parameters
