@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bimnav._placeholders import is_placeholder
+from bimnav._placeholders import is_placeholder, names_nothing
 from bimnav._wording import counted
+from bimnav.ifc._model import _name_of
 
 
 @pytest.mark.parametrize(
@@ -43,3 +44,17 @@ def test_a_sentence_agrees_with_its_number():
     message = "{n} [door fills|doors fill] no [opening|openings]."
     assert counted(message, 1) == "1 door fills no opening."
     assert counted(message, 0) == "0 doors fill no openings."
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["Project Number", "Default", "Building", "My Project", "Projekt1", "Gebäude", "0001", "12370", "Untitled", ""],
+)
+def test_a_project_whose_name_says_nothing_is_called_after_its_file(name):
+    assert names_nothing(name)
+    assert _name_of(name, ("models/town_hall.ifc",)) == "town_hall"
+
+
+@pytest.mark.parametrize("name", ["Town Hall", "Projekt-FZK-Haus", "FM-A-01", "BIM2PRAXIS", "House", "Haus 3"])
+def test_a_project_keeps_the_name_it_was_given(name):
+    assert _name_of(name, ("models/a.ifc",)) == name

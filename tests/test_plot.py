@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
+import shapely
+from matplotlib.figure import Figure
 from PIL import Image
 
 import bimnav as bn
 from bimnav.errors import InputError, MissingExtraError, ValueRangeError
 from bimnav.plot import figure_bytes
+from bimnav.plot._names import draw_names
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +54,36 @@ def test_a_field_is_drawn_with_its_unit_and_refused_in_another_shape(office):
     assert ax.images[0].get_array().max() == pytest.approx(field[0][np.isfinite(field[0])].max())
     with pytest.raises(InputError, match="the field is"):
         bn.plot_field(graph, field[0])
+
+
+def test_names_of_rooms_cover_neither_marks_nor_each_other_and_stay_in_their_rooms(office):
+    tour = office[3].tours[0]
+    ax = drawn(lambda ax: bn.plot_tour(tour, ax=ax))
+    names = [text for text in ax.texts if text.get_style() == "italic"]
+    to_plan = ax.transData.inverted()
+    boxes = [shapely.box(*to_plan.transform(text.get_window_extent()).ravel()) for text in names]
+    assert len(names) >= 8
+    marks = [shapely.Point(stop.destination) for stop in tour.stops] + [shapely.Point(tour.start_point)]
+    assert not any(box.intersects(mark) for box in boxes for mark in marks)
+    assert not any(a.intersects(b) for a, b in itertools.combinations(boxes, 2))
+    rooms = {region.name: region.polygon for region in tour.graph.environment.regions if region.storey == 0}
+    for text, box in zip(names, boxes, strict=True):
+        told = text.get_text().replace("\n", " ")
+        room = next(polygon for name, polygon in rooms.items() if name.startswith(told))
+        assert room.buffer(0.01).covers(box)
+
+
+def test_a_name_is_written_on_two_lines_or_smaller_or_left_out_as_its_room_asks():
+    def written(width, depth):
+        figure = Figure(figsize=(5, 5))
+        ax = figure.add_axes((0, 0, 1, 1))
+        draw_names(ax, [("12 Archive", shapely.box(0, 0, width, depth))], (0, 0, 10, 10))
+        return [(text.get_text(), text.get_fontsize()) for text in ax.texts]
+
+    assert written(5, 1) == [("12 Archive", 6.5)]
+    assert written(0.95, 1) == [("12\nArchive", 6.5)]
+    assert written(0.55, 0.4) == [("12", 5.5)]
+    assert written(0.2, 0.2) == []
 
 
 def test_a_fleet_is_drawn_robot_by_robot(office):

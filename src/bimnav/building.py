@@ -323,7 +323,7 @@ class Building:
     Parameters
     ----------
     name
-        Name of the project, or of the file.
+        Name of the project; of the file, where that says nothing, such as `Project Number`.
     storeys
         From the lowest to the highest.
     spaces, elements, doors, openings, connectors

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bimnav._georeference import Georeference
+from bimnav._placeholders import names_nothing
 from bimnav.building import (
     Building,
     Connector,
@@ -103,7 +104,7 @@ def to_building(
     }
     ledger = tables["ledger"]
     return Building(
-        name=tables["project"] or (Path(sources[0]).stem if sources else ""),
+        name=_name_of(tables["project"], sources),
         storeys=tuple(Storey(**row) for row in tables["storeys"]),
         spaces=tuple(Space(**with_shapes(row)) for row in tables["spaces"]),
         elements=tuple(elements.values()),
@@ -152,3 +153,9 @@ def _shapes_of(model: Model) -> list[Shape]:
         for index, shape in zip(which.tolist(), Shape.copies(mesh, arrays["placements"][which]), strict=True):
             shapes[index] = shape
     return shapes
+
+
+def _name_of(project: str, sources: Sequence[str]) -> str:
+    """Return the name of a project; the file's, where the project's says nothing."""
+    stem = Path(sources[0]).stem if sources else ""
+    return stem if stem and names_nothing(project or "") else project or stem

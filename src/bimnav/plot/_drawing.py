@@ -12,7 +12,6 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from bimnav import _checks
@@ -42,7 +41,6 @@ __all__ = [
     "draw_cells",
     "draw_elements",
     "draw_mark",
-    "draw_names",
     "figure_size",
     "finish",
     "parts_at",
@@ -80,8 +78,8 @@ COLORS = {
     "lost": "#cc79a7",
 }
 WALLS = ("IfcWall", "IfcCurtainWall", "IfcWindow", "IfcColumn", "IfcPlate", "IfcMember", "IfcRailing", "IfcSlab")
-_LETTER = 0.008  # width of a letter, as a share of the width of a plan
 _METRES_PER_FOOT = 0.3048
+_LONGEST, _TAIL = 72, 32  # letters of a name beside a plan, and how many of them from its end
 DOTS_PER_INCH = 200
 
 
@@ -152,7 +150,7 @@ def finish(ax: Axes, bounds: Sequence[float], unit: Unit) -> None:
 
 def add_key(ax: Axes, handles: Sequence[Any], names: Sequence[str] = ()) -> None:
     """Put the key, and a numbered list of names, at the right of the axes."""
-    blank = [Line2D([], [], linestyle="none", label=plain(name)) for name in names]
+    blank = [Line2D([], [], linestyle="none", label=plain(_shortened(name))) for name in names]
     ax.legend(
         handles=[*handles, *blank],
         loc="upper left",
@@ -162,6 +160,11 @@ def add_key(ax: Axes, handles: Sequence[Any], names: Sequence[str] = ()) -> None
         fontsize=8,
         handlelength=1.4,
     )
+
+
+def _shortened(name: str) -> str:
+    """Return a name short enough to stand beside a plan; what tells it from others is often at its end."""
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - _TAIL - 3].rstrip()} … {name[-_TAIL:].lstrip()}"
 
 
 def box_around(bounds: Sequence[float], share: float = 0.03) -> tuple[float, float, float, float]:
@@ -180,8 +183,6 @@ def draw_elements(ax: Axes, environment: IndoorEnvironment, storey: int) -> list
         patches_of(others, facecolor=COLORS["furniture"], edgecolor="#6b6459", linewidth=0.5, alpha=0.75, zorder=3)
     )
     ax.add_collection(patches_of(walls, facecolor=COLORS["wall"], edgecolor="none", zorder=3))
-    rooms = [r for r in environment.regions if r.storey == storey and r.source == "space"]
-    draw_names(ax, [(room.name, room.polygon) for room in rooms])
     key = [Patch(color=COLORS["wall"], label="wall, window, column")]
     if others:
         key.append(Patch(facecolor=COLORS["furniture"], edgecolor="#6b6459", label="other obstacle"))
@@ -235,8 +236,11 @@ def _sides(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def draw_mark(ax: Axes, point: Sequence[float], text: str, color: str) -> None:
     x, y = point[:2]
-    ax.plot(x, y, "o", color=color, markersize=11, markeredgecolor="white", zorder=8)
-    ax.text(x, y, text, color="white", ha="center", va="center", fontsize=7, fontweight="bold", zorder=9)
+    (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
+    is_outside = not (x0 <= x <= x1 and y0 <= y <= y1)  # the rim of the plan cuts no mark that lies within
+    ax.plot(x, y, "o", color=color, markersize=11, markeredgecolor="white", zorder=8, clip_on=is_outside)
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7, "fontweight": "bold", "zorder": 9}
+    ax.text(x, y, text, color="white", clip_on=is_outside, **style)
 
 
 def draw_arrow(ax: Axes, leg: NDArray[np.float64], color: str = COLORS["path"]) -> None:
@@ -249,20 +253,6 @@ def draw_arrow(ax: Axes, leg: NDArray[np.float64], color: str = COLORS["path"]) 
     middle, ahead = leg[k] + 0.5 * steps[k], leg[k] + 0.5 * steps[k] + steps[k] / lengths[k] * 1e-3
     arrow = {"arrowstyle": "-|>", "color": color, "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", xy=tuple(ahead), xytext=tuple(middle), arrowprops=arrow, zorder=7)
-
-
-def draw_names(ax: Axes, rooms: Sequence[tuple[str, BaseGeometry]]) -> None:
-    """Write the names of rooms into them, where there is room for them."""
-    whole = shapely.total_bounds([polygon for _, polygon in rooms]) if rooms else np.zeros(4)
-    letter = _LETTER * max(whole[2] - whole[0], whole[3] - whole[1])
-    for name, polygon in rooms:
-        x0, y0, x1, y1 = polygon.bounds
-        if len(name) * letter > 1.3 * (x1 - x0) or 2 * letter > y1 - y0:
-            continue
-        x, y = polygon.representative_point().coords[0]
-        text = ax.text(x, y, plain(name), color="#6f6a5d", fontsize=6.5, style="italic", ha="center", zorder=5)
-        text.set_clip_on(True)
-        text.set_path_effects([withStroke(linewidth=2, foreground="white")])
 
 
 def parts_at(leg: NDArray[np.float64], level: float) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:

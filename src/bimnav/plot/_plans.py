@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -32,7 +32,6 @@ from bimnav.plot._drawing import (
     draw_cells,
     draw_elements,
     draw_mark,
-    draw_names,
     figure_size,
     finish,
     parts_at,
@@ -42,6 +41,7 @@ from bimnav.plot._drawing import (
     storey_of,
     unit_for,
 )
+from bimnav.plot._names import draw_names, draw_rooms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,9 +51,11 @@ if TYPE_CHECKING:
     from bimnav.environment import IndoorEnvironment
     from bimnav.graph import NavGraph
     from bimnav.plan import TeamPlan, Tour
+    from bimnav.plan.tours import Point
     from bimnav.sim import SimResult
 
 __all__ = [
+    "draw_graph",
     "figure_bytes",
     "plot_building",
     "plot_environment",
@@ -123,7 +125,7 @@ def plot_building(
     ax.add_collection(patches_of(others, facecolor=COLORS["furniture"], alpha=0.75, **edge))
     ax.add_collection(patches_of(stairs, facecolor="#efe3c8", **edge))
     ax.add_collection(patches_of(walls, facecolor=COLORS["wall"], edgecolor="none", zorder=4))
-    draw_names(ax, [(space.label, part.polygon) for space, part in rooms])
+    draw_names(ax, [(space.label, part.polygon) for space, part in rooms], bounds, others=[*walls, *others, *stairs])
     ax.set_title(plain(f"{building.name}, {building.storeys[index].name}"), fontsize=10)
     finish(ax, bounds, unit_for(building.unit, unit))
     key = [Patch(color=COLORS["wall"], label="wall, window, column")]
@@ -178,6 +180,7 @@ def plot_field(
         ax.contour(xs, ys, values, levels=8, colors="white", linewidths=0.5, alpha=0.7, zorder=1)
     if graph.environment is not None:
         draw_elements(ax, graph.environment, storey)
+        draw_rooms(ax, graph.environment, storey, bounds)
         ax.set_title(plain(graph.environment.storeys[storey].name), fontsize=10)
     finish(ax, bounds, unit_for(graph.environment, unit))
     bar = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02)
@@ -206,7 +209,7 @@ def plot_fleet(
         _checks.need("plan", plan, "TeamPlan")
     graph = plan.tours[0].graph
     storey = storey_of(storey, plan.tours[0].start.storey, graph.frame.elevations)
-    ax = plot_graph(graph, storey=storey, ax=ax, unit=unit)
+    ax = draw_graph(graph, storey, ax, unit, tours=plan.tours)
     level = graph.frame.elevations[storey]
     key: list[Any] = []
     for k, (robot, tour) in enumerate(zip(plan.robots, plan.tours, strict=True)):
@@ -249,10 +252,11 @@ def plot_environment(
     ax.add_collection(patches_of(regions, facecolor=COLORS["floor"], edgecolor="#d0cdc4", linewidth=0.5, zorder=0))
     key = draw_elements(ax, environment, storey)
     targets = [target for target in environment.targets if target.storey == storey]
+    finish(ax, bounds, unit_for(environment, unit))
     for number, target in enumerate(targets, 1):
         draw_mark(ax, target.destination, str(number), COLORS["target"])
+    draw_rooms(ax, environment, storey, bounds, marks=[target.destination for target in targets])
     ax.set_title(plain(environment.storeys[storey].name), fontsize=10)
-    finish(ax, bounds, unit_for(environment, unit))
     add_key(ax, key, [f"{number}  {target.name}" for number, target in enumerate(targets, 1)])
     return ax
 
@@ -271,6 +275,18 @@ def plot_graph(graph: NavGraph, *, storey: int | None = None, ax: Axes | None = 
     unit
         Of the axes; None takes feet for models in feet, else metres.
     """
+    return draw_graph(graph, storey, ax, unit)
+
+
+def draw_graph(
+    graph: NavGraph,
+    storey: int | None,
+    ax: Axes | None,
+    unit: Unit | None,
+    *,
+    tours: Sequence[Tour] = (),
+) -> Axes:
+    """Draw as `plot_graph` does, with names of rooms where tours will leave them room."""
     _checks.need("graph", graph, "NavGraph")
     storey = storey_of(storey, graph.frame.ground, graph.frame.elevations)
     bounds = shown_box(graph, storey)
@@ -278,6 +294,8 @@ def plot_graph(graph: NavGraph, *, storey: int | None = None, ax: Axes | None = 
     key = draw_cells(ax, graph, storey)
     if graph.environment is not None:
         key += draw_elements(ax, graph.environment, storey)
+        marks, lines = _places_of(tours, graph.frame.elevations[storey])
+        draw_rooms(ax, graph.environment, storey, bounds, marks=marks, lines=lines)
         ax.set_title(plain(graph.environment.storeys[storey].name), fontsize=10)
     finish(ax, bounds, unit_for(graph.environment, unit))
     add_key(ax, key)
@@ -301,7 +319,7 @@ def plot_tour(tour: Tour, *, storey: int | None = None, ax: Axes | None = None, 
     _checks.need("tour", tour, "Tour")
     graph = tour.graph
     storey = storey_of(storey, tour.start.storey, graph.frame.elevations)
-    ax = plot_graph(graph, storey=storey, ax=ax, unit=unit)
+    ax = draw_graph(graph, storey, ax, unit, tours=[tour])
     level = graph.frame.elevations[storey]
     climbs = _draw_way(ax, tour, level, COLORS["path"])
     key: list[Any] = [Line2D([], [], color=COLORS["path"], linewidth=1.8, label=f"route, {tour.length:.1f} m")]
@@ -327,6 +345,15 @@ def plot_tour(tour: Tour, *, storey: int | None = None, ax: Axes | None = None, 
     legend = ax.get_legend()
     add_key(ax, [*(legend.legend_handles if legend else ()), *key], ["", *names])
     return ax
+
+
+def _places_of(tours: Sequence[Tour], level: float) -> tuple[list[Point], list[NDArray[np.float64]]]:
+    """Return where marks of tours stand at a level, and their ways there, metres."""
+    points = [tour.start_point for tour in tours]
+    points += [point for tour in tours for stop in tour.stops for point in (stop.end, stop.destination)]
+    points += [target.destination for tour in tours for target in tour.unreached]
+    ways = [piece for tour in tours for leg in tour.route for part in parts_at(leg, level) for piece in part]
+    return [point for point in points if abs(point[2] - level) < 1e-6], ways
 
 
 def _draw_way(ax: Axes, tour: Tour, level: float, color: str) -> bool:

@@ -17,7 +17,7 @@ from bimnav import _checks
 from bimnav._files import write_bytes
 from bimnav.errors import InputError, MissingExtraError, ValueRangeError
 from bimnav.plot._drawing import ROBOTS, STATUSES, add_key, plain, shown_box, storey_of
-from bimnav.plot._plans import plot_graph
+from bimnav.plot._plans import draw_graph
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -136,7 +136,13 @@ def _moving_plan(result: SimResult, storey: int) -> tuple[Figure, Any]:
     height = _WIDTH * min(max((box[3] - box[1]) / (box[2] - box[0]), 0.3), 1.2)
     figure = Figure(figsize=(_WIDTH + 2.2, height + 0.8), dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
-    ax = plot_graph(graph, storey=storey, ax=figure.add_subplot())
+    places = {
+        stop.global_id: stop.destination[:2]
+        for stops in result.stops
+        for stop in stops
+        if stop.cell.storey == storey and stop.kind == "target"
+    }
+    ax = draw_graph(graph, storey, figure.add_subplot(), None, tours=result.tours)
     least = 0.012 * max(box[2] - box[0], box[3] - box[1])
     bodies = []
     for k, robot in enumerate(result.robots):
@@ -144,12 +150,6 @@ def _moving_plan(result: SimResult, storey: int) -> tuple[Figure, Any]:
         ax.add_patch(body)
         bodies.append(body)
     (left,) = ax.plot([], [], "o", color="#d55e00", markersize=6, markeredgecolor="white", zorder=9)
-    places = {
-        stop.global_id: stop.destination[:2]
-        for stops in result.stops
-        for stop in stops
-        if stop.cell.storey == storey and stop.kind == "target"
-    }
     title = ax.set_title(" ", fontsize=10)
     figure.canvas.draw()
     figure.set_layout_engine("none")  # the layout is found once, not for every frame
