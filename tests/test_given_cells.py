@@ -82,3 +82,46 @@ def test_a_tour_starts_at_a_point_or_not_at_all(point):
         return
     with pytest.raises(BimnavError, match="start_point is"):
         bn.plan_tour(GRAPH, Cell(0, 0, 0), [], start_point=point)
+
+
+@pytest.mark.parametrize("reach", [1e15, 1e18, 1e30])
+def test_an_obstacle_without_end_closes_everything_or_is_refused(reach):
+    everything = shapely.box(-reach, -reach, reach, reach)
+    if reach < 2**53:
+        assert not GRAPH.with_obstacle(everything).free.any()
+    else:
+        with pytest.raises(GridError, match="too far"):
+            GRAPH.with_obstacle(everything)
+
+
+def test_a_point_out_of_all_counting_lies_outside_the_map():
+    with pytest.raises(OutsideMapError):
+        GRAPH.frame.cell_at(1e308, 0.0)
+
+
+def test_a_clearance_closes_no_cell():
+    with pytest.raises(ValueRangeError, match="a cost is above"):
+        GRAPH.with_cost(3e38).with_clearance(2.0)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"kind": "rope"},
+        {"length": None},
+        {"length": "1"},
+        {"length": np.nan},
+        {"begin": (0, 0)},
+        {"begin": (0, 0.5, 0)},
+        {"points": [[0, 0], [1, 1]]},
+    ],
+)
+def test_a_link_that_cannot_be_is_refused(change):
+    with pytest.raises(InputError):
+        bn.Link(**{"begin": Cell(0, 0, 0), "end": Cell(1, 0, 0), "length": 1.0, **change})
+
+
+def test_a_replanner_stays_with_its_cells():
+    robot = bn.Replanner(GRAPH, Cell(0, 0, 0), Cell(0, 2, 5))
+    with pytest.raises(GridError, match="same cells"):
+        robot.update(NavGraph.from_mask(np.ones((2, 2), bool)))

@@ -164,7 +164,7 @@ class _Space:
 
     def pose_at(self, place: Place, heading: float | None, role: str) -> tuple[int, int, int]:
         """Return heading, row and column of a place; heading -1 for any."""
-        if heading is not None and not math.isfinite(heading):
+        if heading is not None and not math.isfinite(_checks.number(f"heading of the {role}", heading)):
             raise ValueRangeError(f"heading of the {role} is {heading}.", "Give radians, or None for any.")
         _, row, col = self.frame.cell_at(float(place[0]), float(place[1]), storey=0)
         way = -1 if heading is None else round(heading / _EIGHTH) % search.HEADINGS

@@ -329,6 +329,8 @@ class NavGraph(Kept):
     ) -> Self:
         """Return the graph with something standing in the way, as if the model had it.
 
+        Of what height it is nobody knows: it hides no target from the robot.
+
         Parameters
         ----------
         polygon
@@ -523,7 +525,10 @@ class NavGraph(Kept):
 
         free, cost = np.isfinite(bare), bare
         for metres, weight in clearances:
-            cost = cost * clearance_factors(free, self.frame.cell_size, metres, weight)
+            with np.errstate(over="ignore"):
+                cost = cost * clearance_factors(free, self.frame.cell_size, metres, weight)
+        if not np.isfinite(cost, where=free, out=np.ones_like(free)).all():
+            raise ValueRangeError("a cost is above 3.4e38.", "Give a clearance less weight.")
         return {"cost": _frozen(cost), "bare_cost": bare, "clearances": clearances}
 
     def with_objective(self, objective: Objective) -> Self:

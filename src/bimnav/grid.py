@@ -25,6 +25,7 @@ CELL_LIMIT = 50_000_000
 EROSION = 1e-6
 """A cell is occupied when the cell, eroded by this many metres, meets a polygon: touching is not overlap."""
 
+_FARTHEST = 2.0**53  # cells; beyond, not every one has a number of its own
 _EDGE_SLACK = 1e-9  # fraction of a cell; 0.6 / 0.2 is 2.9999999999999996 but belongs to cell 3
 
 
@@ -200,7 +201,8 @@ class GridFrame:
         return cell
 
     def _index(self, coordinate: float) -> int:
-        return math.floor(coordinate / self.cell_size + _EDGE_SLACK)
+        cells = min(max(coordinate / self.cell_size, -_FARTHEST), _FARTHEST)
+        return math.floor(cells + _EDGE_SLACK)
 
     def center_of(self, cell: Cell) -> tuple[float, float, float]:
         """Return the world point in the middle of a cell on its storey's floor, metres."""
@@ -346,9 +348,9 @@ def _mark(
     if not len(runs):
         return
     points, index = shapely.get_coordinates(runs, return_index=True)
-    if not np.isfinite(points).all():
-        raise GridError("a polygon has corners that are not finite.")
     points = points / frame.cell_size - (frame.first_col, frame.first_row)
+    if not (np.abs(points) < _FARTHEST).all():  # nor a NaN
+        raise GridError("a polygon has corners that are not finite, or too far off to count cells.")
     offsets = np.searchsorted(index, np.arange(len(runs) + 1)).astype(np.int64)
     mark_edges(touched, points, offsets, EROSION / frame.cell_size)
     mark_inside(inside, points, offsets, groups)

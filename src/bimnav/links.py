@@ -7,12 +7,13 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bimnav import _checks
 from bimnav._indoors import part_in
 from bimnav._kept import Kept
 from bimnav.environment import grown
@@ -78,8 +79,10 @@ class Link(Kept):
     factor: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "begin", Cell(*self.begin))
-        object.__setattr__(self, "end", Cell(*self.end))
+        for name in ("begin", "end"):
+            object.__setattr__(self, name, Cell(*_checks.cell(f"{name} of a link", getattr(self, name))))
+        if self.kind not in get_args(ConnectorKind):
+            raise ValueRangeError(f"kind of a link is {self.kind!r}.", "Give 'stair', 'ramp' or 'lift'.")
         if self.begin.storey == self.end.storey:
             raise ValueRangeError(
                 f"link {self.name or self.global_id!r} begins and ends on storey {self.end.storey}.",
@@ -90,9 +93,12 @@ class Link(Kept):
             ("seconds", self.seconds or 0, 0),
             ("factor", self.factor, 1),
         ):
-            if not least <= value < math.inf:
+            if not _checks.number(f"{name} of a link", value) < math.inf or value < least:
                 raise ValueRangeError(f"{name} of a link is {value}.", f"Give a finite number of at least {least}.")
-        points = np.array(self.points, dtype=np.float64).reshape(-1, 3)
+        points = _checks.numbers("points of a link", self.points)
+        if points.size and (points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all()):
+            raise ValueRangeError(f"points of a link have shape {points.shape}.", "Give finite x, y and z of each.")
+        points = points.reshape(-1, 3)
         points.flags.writeable = False
         object.__setattr__(self, "points", points)
 

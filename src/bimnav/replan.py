@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bimnav import _checks
 from bimnav._topology import Node, Topology, topology
 from bimnav._why import NoRoute, why_unreachable
-from bimnav.errors import NoPathError
+from bimnav.errors import GridError, NoPathError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 from bimnav.plan import Path, find_path
@@ -102,8 +102,20 @@ class Replanner:
             The world as it is now, derived from the one before.
         at
             Free cell in which the robot is; None if it has not moved.
+
+        Raises
+        ------
+        GridError
+            If the cells of the graph are others.
+        StartBlockedError, GoalBlockedError
+            If the robot's own cell or its goal is blocked now.
         """
         _checks.need("graph", graph, NavGraph)
+        if graph.frame != self.graph.frame:
+            raise GridError(
+                f"the route is one of {self.graph!r}, the graph is {graph!r}.",
+                "Give a graph of the same cells, or make a new Replanner.",
+            )
         before, ahead = self.graph, self._ahead(at)
         self.graph, self.at = graph, self.at if at is None else at
         if ahead is not None and self._still_holds(before, graph, ahead):

@@ -304,7 +304,8 @@ def distance_matrix(
     Returns
     -------
     distance : (n, n) float64
-        From row to column as in `distance_field`; inf where no path leads, which holds for blocked cells.
+        From row to column as in `distance_field`; inf where no path leads, which holds for blocked cells; 0 from
+        a row to itself, also of a blocked cell.
 
     Raises
     ------
