@@ -57,10 +57,11 @@ def draw_names(
     taken = [shapely.box(x - reach, y - reach, x + reach, y + reach) for x, y in (mark[:2] for mark in marks)]
     covered = shapely.STRtree(list(others))
     for name, polygon in rooms:
+        near = [taken[k] for k in np.flatnonzero(shapely.intersects(taken, shapely.box(*polygon.bounds)))]
         for text, size in _ways(plain(name)):
             width, height = _extent(text, size)
             half = np.array([width, height]) / 2 * metres + _RIM * metres
-            middle = _place(polygon, half, taken, covered)
+            middle = _place(polygon, half, near, covered)
             if middle is not None:
                 written = ax.text(
                     float(middle[0]), float(middle[1]), text, color="#6f6a5d", fontsize=size, style="italic", zorder=5
