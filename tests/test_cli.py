@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 
@@ -200,7 +202,7 @@ def test_the_public_names_are_the_same_for_programs_and_type_checkers():
         assert getattr(bn, name) is not None
 
 
-@pytest.mark.parametrize("command", ["", "run", "inspect", "tasks", "robots", "cache", "doctor"])
+@pytest.mark.parametrize("command", ["", "run", "inspect", "tasks", "robots", "cache", "doctor", "completion"])
 def test_every_help_text_has_examples_and_explains_every_option(command, capsys):
     with pytest.raises(SystemExit):
         main([*command.split(), "--help"])
@@ -247,3 +249,34 @@ def test_many_conflicts_are_a_few_lines(capsys):
     told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  conflict ")]
     assert len(told) == 6
     assert told[-1].endswith("3 more targets on obstacle cells")
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (["ins"], ["inspect"]),
+        (["run", "--cl"], ["--clearance"]),
+        (["run", "house.ifc", "--objective", "t"], ["time"]),
+        (["tasks", "ch"], ["check"]),
+        (["inspect", "--ast"], []),
+        (["run", "--out", ""], []),  # files
+    ],
+)
+def test_bash_completes_commands_options_and_choices(typed, offered, capsys, tmp_path):
+    assert main(["completion", "bash"]) == 0
+    words = " ".join(map(shlex.quote, ["bimnav", *typed]))
+    script = (
+        f'{capsys.readouterr().out}\nCOMP_WORDS=({words}); COMP_CWORD={len(typed)}; _bimnav; echo "${{COMPREPLY[@]}}"'
+    )
+    told = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert told.stdout.split() == offered
+    assert told.stderr == ""
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_other_shells_are_told_of_every_command(shell, capsys):
+    assert main(["completion", shell]) == 0
+    told = capsys.readouterr().out
+    assert all(command in told for command in ("run", "inspect", "tasks", "robots", "cache", "doctor"))
+    assert "clearance" in told

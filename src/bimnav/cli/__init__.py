@@ -1,4 +1,4 @@
-"""The command line: `bimnav run`, `inspect`, `tasks`, `robots`, `cache` and `doctor`."""
+"""The command line: `bimnav run`, `inspect`, `tasks`, `robots`, `cache`, `doctor` and `completion`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import bimnav as bn
 from bimnav._wording import printable
-from bimnav.cli import _cache, _doctor, _inspect, _robots, _run, _tasks
+from bimnav.cli import _cache, _completion, _doctor, _inspect, _robots, _run, _tasks
 from bimnav.cli._shared import BAD_INPUT, BUG, DONE, INTERRUPTED
 from bimnav.errors import BimnavError, UnsafePlanError
 
@@ -81,6 +81,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"bimnav {bn.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for room in (_run, _inspect, _tasks, _robots, _cache, _doctor):
+    for room in (_run, _inspect, _tasks, _robots, _cache, _doctor, _completion):
         room.add_to(commands)
     return parser
