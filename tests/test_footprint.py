@@ -446,13 +446,13 @@ def test_openings_far_from_the_origin_are_cut_as_precisely():
 
 
 def test_openings_beside_the_host_are_not_looked_at(monkeypatch):
-    monkeypatch.setattr(bimnav.footprint, "_solid", None)
+    monkeypatch.setattr(bimnav.footprint._solids, "_solid", None)
     opened = without_faces_at(box((8, 0, 0), (9, 1, 1)), 0.0)
     assert subtract(WALL, [(opened, np.eye(4))]) is WALL
 
 
 def test_an_open_mesh_never_reaches_manifold3d(monkeypatch):
-    monkeypatch.setattr(bimnav.footprint, "_solid", None)  # calling it would raise
+    monkeypatch.setattr(bimnav.footprint._solids, "_solid", None)  # calling it would raise
     solid, opened = box((1, -1, 0), (2, 1, 1)), without_faces_at(box((1, -1, 0), (2, 1, 1)), 1.0)
     assert subtract(without_faces_at(WALL, 3.0), [(solid, np.eye(4))]) is None
     assert subtract(WALL, [(solid, np.eye(4)), (opened, np.eye(4))]) is None
