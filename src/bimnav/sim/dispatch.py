@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +30,7 @@ def assign(world: World, stop: Stop, *, besides: RobotAgent | None = None, cause
     Of several equally short detours the first robot's, and its earliest, is taken.
     """
     best: tuple[float, int, int] | None = None
+    fields: dict[int, NDArray[np.float64]] = {}  # robots share maps
     for agent in world.agents:
         able = set(stop.abilities) <= set(agent.robot.abilities)
         if agent is besides or not able or agent.is_over or agent.status is RobotStatus.FAILED:
@@ -38,10 +38,10 @@ def assign(world: World, stop: Stop, *, besides: RobotAgent | None = None, cause
         graph = world.graph_of(agent)
         if not graph.free[stop.cell]:
             continue
-        field = distance_field(graph, stop.cell)
-        for position, detour in _detours(agent, graph, field):
-            if not _is_in_turn(agent, stop, position):
-                continue
+        if id(graph) not in fields:
+            fields[id(graph)] = distance_field(graph, stop.cell)
+        turns = _turns_for(agent, stop)
+        for position, detour in zip(turns, _detours(agent, graph, fields[id(graph)], turns), strict=True):
             if math.isfinite(detour) and (best is None or detour < best[0] - JOINED):
                 best = detour, agent.index, position
     if best is None:
@@ -57,18 +57,22 @@ def assign(world: World, stop: Stop, *, besides: RobotAgent | None = None, cause
     return True
 
 
-def _detours(agent: RobotAgent, graph: NavGraph, field: NDArray[np.float64]) -> Iterable[tuple[int, float]]:
-    """Yield the places in an agenda at which a stop can be put, and metres it adds there."""
-    here = cell_near(graph, agent.here(), agent.storey)
-    cells = [here, *(errand.cell for errand in agent.agenda)]
-    first = 1 if agent.agenda and agent.status is not RobotStatus.IDLE else 0
-    for position in range(first, len(cells)):
-        reach = _reach(field, cells[position])
-        if position + 1 < len(cells):
-            after = agent.agenda[position]
-            onward = _reach(field, after.cell)
-            reach += onward - (after.leg.length if after.leg is not None else abs(reach - onward))
-        yield position, reach
+def _detours(agent: RobotAgent, graph: NavGraph, field: NDArray[np.float64], turns: range) -> list[float]:
+    """Return the metres that a stop adds at places of an agenda; not finite where it cannot be put."""
+    if not turns:
+        return []
+    agenda = list(agent.agenda)[: turns.stop]
+    cells = [errand.cell for errand in agenda]
+    here = [cell_near(graph, agent.here(), agent.storey)] if turns.start == 0 else []
+    reaches = [_reach(field, cell) for cell in (*here, *cells[max(turns.start - 1, 0) :])]
+    detours = []
+    for k, reach in enumerate(reaches[: len(turns)]):
+        detour = reach
+        if turns.start + k < len(agenda):
+            leg, onward = agenda[turns.start + k].leg, reaches[k + 1]
+            detour += onward - (leg.length if leg is not None else abs(reach - onward))
+        detours.append(detour)
+    return detours
 
 
 def hand_over(agent: RobotAgent, cause: str) -> None:
@@ -84,12 +88,18 @@ def hand_over(agent: RobotAgent, cause: str) -> None:
             agent.become(status)
 
 
-def _is_in_turn(agent: RobotAgent, stop: Stop, position: int) -> bool:
-    """Tell whether a stop at some place of an agenda keeps the order of priorities."""
+def _turns_for(agent: RobotAgent, stop: Stop) -> range:
+    """Return the places of an agenda at which a stop keeps the order of priorities."""
     first = 1 if agent.agenda and agent.status is not RobotStatus.IDLE else 0
-    known = [(k, e.stop.priority) for k, e in enumerate(agent.agenda) if e.stop is not None and e.stop.kind == "target"]
-    before = all(priority >= stop.priority for k, priority in known if first <= k < position)
-    return before and all(priority <= stop.priority for k, priority in known if k >= position)
+    begin, end = first, len(agent.agenda)
+    for k, errand in enumerate(agent.agenda):
+        if errand.stop is None or errand.stop.kind != "target":
+            continue
+        if errand.stop.priority > stop.priority:
+            begin = max(begin, k + 1)
+        elif errand.stop.priority < stop.priority and k >= first:
+            end = min(end, k)
+    return range(begin, end + 1)
 
 
 def _reach(field: NDArray[np.float64], cell: Cell | None) -> float:

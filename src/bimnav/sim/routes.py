@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,7 @@ __all__ = ["JOINED", "Legs", "Line", "cell_near", "end_of", "legs_of", "way_betw
 JOINED = 1e-6  # metres between the end of one leg and the start of the next
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Line:
     """A line to drive.
 
@@ -37,7 +38,7 @@ class Line:
     points: NDArray[np.float64]
     storeys: NDArray[np.int32]
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Metres."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
