@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bimnav.graph import NavGraph
-from bimnav.grid import Cell
 from bimnav.plan import distance_field
 from bimnav.sim.errands import Errand, Order
 from bimnav.sim.routes import JOINED, cell_near, end_of
@@ -39,9 +39,8 @@ def assign(world: World, stop: Stop, *, besides: RobotAgent | None = None, cause
         if not graph.free[stop.cell]:
             continue
         if id(graph) not in fields:
-            fields[id(graph)] = distance_field(graph, stop.cell)
-        turns = _turns_for(agent, stop)
-        for position, detour in zip(turns, _detours(agent, graph, fields[id(graph)], turns), strict=True):
+            fields[id(graph)] = _reaches(distance_field(graph, stop.cell))
+        for position, detour in _detours(agent, graph, fields[id(graph)], stop):
             if math.isfinite(detour) and (best is None or detour < best[0] - JOINED):
                 best = detour, agent.index, position
     if best is None:
@@ -57,22 +56,22 @@ def assign(world: World, stop: Stop, *, besides: RobotAgent | None = None, cause
     return True
 
 
-def _detours(agent: RobotAgent, graph: NavGraph, field: NDArray[np.float64], turns: range) -> list[float]:
-    """Return the metres that a stop adds at places of an agenda; not finite where it cannot be put."""
-    if not turns:
-        return []
-    agenda = list(agent.agenda)[: turns.stop]
-    cells = [errand.cell for errand in agenda]
-    here = [cell_near(graph, agent.here(), agent.storey)] if turns.start == 0 else []
-    reaches = [_reach(field, cell) for cell in (*here, *cells[max(turns.start - 1, 0) :])]
-    detours = []
-    for k, reach in enumerate(reaches[: len(turns)]):
-        detour = reach
-        if turns.start + k < len(agenda):
-            leg, onward = agenda[turns.start + k].leg, reaches[k + 1]
-            detour += onward - (leg.length if leg is not None else abs(reach - onward))
-        detours.append(detour)
-    return detours
+def _detours(
+    agent: RobotAgent, graph: NavGraph, reaches: NDArray[np.float64], stop: Stop
+) -> Iterable[tuple[int, float]]:
+    """Yield the places in an agenda at which a stop can be put, and metres it adds there."""
+    here = cell_near(graph, agent.here(), agent.storey)
+    ways = [math.inf if here is None else reaches.item(here), *(reaches.item(each.cell) for each in agent.agenda)]
+    if min(ways) == math.inf:
+        return
+    agenda = list(agent.agenda)
+    for position in _turns_for(agent, stop):
+        way = ways[position]
+        if position < len(agenda):
+            leg, onward = agenda[position].leg, ways[position + 1]
+            yield position, way + (onward - (leg.length if leg is not None else abs(way - onward)))
+        else:
+            yield position, way
 
 
 def hand_over(agent: RobotAgent, cause: str) -> None:
@@ -102,12 +101,12 @@ def _turns_for(agent: RobotAgent, stop: Stop) -> range:
     return range(begin, end + 1)
 
 
-def _reach(field: NDArray[np.float64], cell: Cell | None) -> float:
-    """Return the distance of a cell; of a closed one, that of the nearest around it."""
-    if cell is None:
-        return math.inf
-    reach = float(field[cell])
-    if math.isfinite(reach):
-        return reach
-    around = field[cell.storey, max(cell.row - 1, 0) : cell.row + 2, max(cell.col - 1, 0) : cell.col + 2]
-    return float(around.min())
+def _reaches(field: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a field in which a closed cell is as far as the nearest around it."""
+    from scipy import ndimage
+
+    reaches = field.astype(np.float64)
+    for storey in np.flatnonzero(np.isfinite(field).any(axis=(1, 2))).tolist():
+        around = ndimage.minimum_filter(field[storey], size=3, mode="nearest")
+        reaches[storey] = np.where(np.isfinite(field[storey]), field[storey], around)
+    return reaches
