@@ -17,7 +17,7 @@ from bimnav.errors import ValueRangeError
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Crossing", "Passage", "SpeedLimit", "crossings", "cut_at"]
+__all__ = ["Areas", "Crossing", "Passage", "SpeedLimit", "crossings", "cut_at"]
 
 _TOUCH = 1e-6  # metres; a route that only touches an area does not cross it
 _JOIN = 1e-6  # metres between two crossings that are one
@@ -86,8 +86,31 @@ class Crossing:
     area: int
 
 
+class Areas:
+    """Areas of storeys, and the boxes around them.
+
+    Parameters
+    ----------
+    areas
+        Polygon and storey of each.
+    """
+
+    def __init__(self, areas: Sequence[tuple[BaseGeometry, int]]) -> None:
+        self.polygons = [polygon for polygon, _ in areas]
+        self.storeys = np.array([storey for _, storey in areas], dtype=np.int32)
+        bounds = shapely.bounds(self.polygons).reshape(-1, 4)
+        self.low, self.high = bounds[:, :2], bounds[:, 2:]
+
+    def near(self, points: NDArray[np.float64], storeys: NDArray[np.int32]) -> list[int]:
+        """Return those whose boxes meet that of a line, on one of its storeys; never an empty polygon."""
+        low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        found = np.flatnonzero(((self.low <= high) & (self.high >= low)).all(axis=1)).tolist()
+        on = set(storeys.tolist())
+        return [index for index in found if self.storeys.item(index) in on]
+
+
 def crossings(
-    points: NDArray[np.float64], storeys: NDArray[np.int32], areas: Sequence[tuple[BaseGeometry, int]]
+    points: NDArray[np.float64], storeys: NDArray[np.int32], areas: Areas | Sequence[tuple[BaseGeometry, int]]
 ) -> list[Crossing]:
     """Find where a line lies inside areas of its storeys.
 
@@ -103,28 +126,23 @@ def crossings(
     crossings
         By begin, then area; touching pieces of one area are one crossing.
     """
-    if not areas or len(points) < 2:
+    if len(points) < 2:
+        return []
+    areas = areas if isinstance(areas, Areas) else Areas(areas)
+    around = areas.near(points, storeys)
+    if not around:
         return []
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     reached = np.append(0.0, steps.cumsum())
     lines = shapely.linestrings(np.stack([points[:-1, :2], points[1:, :2]], axis=1))
-    found: list[list[tuple[float, float]]] = [[] for _ in areas]
-    on, low, high = set(storeys.tolist()), points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    bounds = shapely.bounds([polygon for polygon, _ in areas])
-    near_by = ((bounds[:, :2] <= high) & (bounds[:, 2:] >= low)).all(axis=1)  # never for an empty polygon
-    for index, (polygon, storey) in enumerate(areas):
-        if storey not in on or not near_by[index]:
-            continue
-        near = np.flatnonzero((storeys[:-1] == storey) & shapely.intersects(lines, polygon))
+    merged = []
+    for index in around:
+        polygon, parts = areas.polygons[index], []
+        near = np.flatnonzero((storeys[:-1] == areas.storeys[index]) & shapely.intersects(lines, polygon))
         for k in near.tolist():
             for begin, end in _inside(points[k, :2], points[k + 1, :2], shapely.intersection(lines[k], polygon)):
-                found[index].append((reached[k] + begin * steps[k], reached[k] + end * steps[k]))
-    merged = [
-        Crossing(float(begin), float(end), index)
-        for index, parts in enumerate(found)
-        for begin, end in _joined(parts)
-        if end - begin > _TOUCH
-    ]
+                parts.append((reached[k] + begin * steps[k], reached[k] + end * steps[k]))
+        merged += [Crossing(float(begin), float(end), index) for begin, end in _joined(parts) if end - begin > _TOUCH]
     return sorted(merged, key=lambda crossing: (crossing.begin, crossing.area))
 
 

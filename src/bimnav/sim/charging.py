@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from bimnav.plan import distance_field
 from bimnav.sim.errands import Errand, Process, Step
-from bimnav.sim.motion import drive
 from bimnav.sim.routes import JOINED, Line
 from bimnav.sim.track import RobotStatus
 from bimnav.stops import Stop
@@ -112,7 +111,7 @@ def _energy_for(agent: RobotAgent, errand: Errand) -> float | None:
         line = world.find_line(agent, errand)
     if line is None:
         return None
-    motion = drive(line.points, line.storeys, agent.robot, heading=agent.heading)
+    motion = world.rehearsal.drive(line, agent.robot, agent.robot.speed, agent.heading)
     powers = agent.battery.powers
     joules = motion.duration * powers[RobotStatus.MOVING]
     if errand.stop is not None and errand.stop.kind == "charger":

@@ -17,7 +17,7 @@ from bimnav.sim.errands import Errand, Order, Process, Step
 from bimnav.sim.incidents import closure_around
 from bimnav.sim.knowledge import Closure
 from bimnav.sim.log import EventKind
-from bimnav.sim.motion import Motion, drive, rest, stand
+from bimnav.sim.motion import Motion, rest, stand
 from bimnav.sim.people import Walker
 from bimnav.sim.routes import JOINED, Line
 from bimnav.sim.stretches import Gate, Stretch, gates_of, joined
@@ -176,14 +176,7 @@ class Driver(Body):
     def move(self, group: list[Stretch], after: list[Stretch], errand: Errand) -> Step:
         """Drive stretches in one go, and stop for what comes in the way; answer whether their end was reached."""
         line, limits = joined(group)
-        motion = drive(
-            line.points,
-            line.storeys,
-            self.robot,
-            speed=self.cruise,
-            heading=self.heading,
-            limits=limits,
-        )
+        motion = self.world.rehearsal.drive(line, self.robot, self.cruise, self.heading, limits)
         gates = deque(gates_of(group, motion, self.robot.acceleration))
         begin, passed = float(self.world.clock.now), 0.0
         self.under_way = begin, motion

@@ -117,7 +117,7 @@ def _set_door(world: World, global_id: str, state: DoorState) -> None:
     if before is None:
         raise ModelError(f"door {global_id} is not in the simulation.", "", {"global_id": global_id})
     door = SimDoor(global_id, state, before.opening_time, before.name, before.polygon, before.storey)
-    world.doors[global_id] = door
+    world.set_door(door)
     world.note("change", f"{door.label} is {'locked' if state == 'locked' else 'unlocked'}")
     assert door.polygon is not None  # noqa: S101 - doors in a world have a place
     world.close(Closure(door.label, door.polygon, door.storey, door))

@@ -13,7 +13,7 @@ from bimnav.environment import grown
 from bimnav.sim.areas import crossings
 from bimnav.sim.changes import ObstacleAppears
 from bimnav.sim.knowledge import Closure
-from bimnav.sim.motion import Motion, drive
+from bimnav.sim.motion import Motion
 from bimnav.sim.people import Walker, first_meeting
 from bimnav.sim.routes import Line
 from bimnav.sim.stretches import joined
@@ -55,7 +55,7 @@ class Lookout:
 
     def __init__(self, world: World) -> None:
         self.world = world
-        self._looks: dict[int, tuple[Motion, dict[str, tuple[float, str]]]] = {}
+        self._looks: dict[int, tuple[object, dict[str, tuple[float, str]]]] = {}
         self._rngs: dict[int, np.random.Generator] = {}
 
     def next_incident(self, agent: Driver, motion: Motion, begin: float, passed: float) -> Incident | None:
@@ -99,15 +99,15 @@ class Lookout:
     def is_clear(self, agent: Driver, line: Line, walker: Walker, seconds: float) -> bool:
         """Tell whether a robot that goes on now drives for some seconds before it has to stop for somebody."""
         line, limits = joined(self.world.stretches(agent, line)) if self.world.setting.limits else (line, None)
-        motion = drive(line.points, line.storeys, agent.robot, speed=agent.cruise, heading=agent.heading, limits=limits)
+        motion = self.world.rehearsal.drive(line, agent.robot, agent.cruise, agent.heading, limits)
         moment = self._stop_for(agent, motion, float(self.world.clock.now), 0.0, walker)
         return moment is None or moment > seconds
 
     def _looked(self, agent: Driver, motion: Motion) -> dict[str, tuple[float, str]]:
         """Return when a robot will find each hidden obstacle in a motion: seconds, and by sensing or contact."""
         known = self._looks.get(agent.index)
-        if known is None or known[0] is not motion:
-            known = self._looks[agent.index] = (motion, {})
+        if known is None or known[0] is not agent.under_way:  # equal motions are one object
+            known = self._looks[agent.index] = (agent.under_way, {})
         for name, obstacle in self.world.hidden.items():
             if name not in known[1]:
                 known[1][name] = self._find(agent, motion, obstacle)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -19,7 +20,7 @@ _NOW, _EVEN = np.zeros(1), np.ones(1)
 _STRAIGHT = 1e-6  # radians; a smaller change of direction is rounding
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """A stretch of driving from rest to rest, or of standing.
 
@@ -43,7 +44,7 @@ class Motion:
     turns: NDArray[np.float64]
     length: float
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Seconds from begin to end."""
         return float(self.times[-1])
@@ -52,7 +53,7 @@ class Motion:
         """Return the row that holds some seconds after the begin."""
         return max(int(np.searchsorted(self.times, seconds, side="right")) - 1, 0)
 
-    @property
+    @cached_property
     def reached(self) -> NDArray[np.float64]:
         """(n,) float64, metres driven at the begin of every row."""
         return np.append(0.0, np.linalg.norm(np.diff(self.points, axis=0), axis=1).cumsum())

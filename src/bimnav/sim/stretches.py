@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bimnav.sim.areas import Crossing, Passage, SpeedLimit, crossings, cut_at
+from bimnav.sim.areas import Areas, Crossing, Passage, SpeedLimit, crossings, cut_at
 from bimnav.sim.doors import SimDoor
 from bimnav.sim.lifts import Lift
 from bimnav.sim.motion import Motion
@@ -21,10 +22,10 @@ from bimnav.sim.routes import JOINED, Line
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Gate", "Stretch", "cut", "gates_of", "joined"]
+__all__ = ["Cutter", "Gate", "Stretch", "cut", "gates_of", "joined"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Stretch:
     """A part of a way on which the same resources are needed, or that is ridden.
 
@@ -55,7 +56,7 @@ class Stretch:
     area: BaseGeometry | None = None
     storey: int = 0
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Metres."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
@@ -102,39 +103,83 @@ def cut(
     lifts: Sequence[Lift],
     limits: Sequence[SpeedLimit],
 ) -> list[Stretch]:
-    """Cut a line where it enters and leaves doorways, passages and lifts.
+    """Cut a line where it enters and leaves doorways, passages and lifts; see `Cutter`."""
+    return Cutter(doors, passages, lifts, limits).cut(line)
+
+
+class Cutter:
+    """Cuts lines where they enter and leave doorways, passages and lifts.
 
     Resources whose floor overlaps along the way are needed together, from where the first begins to where
     the last ends, so that nobody waits for one while standing in another.
     """
-    if not (doors or passages or lifts or limits):
-        return [Stretch(line.points, line.storeys)]
-    shared: list[SimDoor | Passage] = [*doors, *passages]
-    found = crossings(line.points, line.storeys, [(_polygon(area), area.storey) for area in shared])
-    sections = _sections(found)
-    rides = _rides(line, lifts)
-    places = [place for begin, end, *_ in (*sections, *rides) for place in (begin, end)]
-    stretches, done = [], 0.0
-    for points, storeys in cut_at(line.points, line.storeys, places):
-        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-        middle = done + length / 2
-        done += length
-        lift = next((lift for begin, end, lift in rides if begin <= middle <= end), None)
-        used = next((used for begin, end, used in sections if begin <= middle <= end), ())
-        areas = [shared[k] for k in sorted(used)]
-        capped = (points, storeys, None) if lift or not limits else _limited(points, storeys, limits)
-        stretches.append(
-            Stretch(
-                *capped[:2],
-                frozenset(name_of(area) for area in areas),
-                tuple(area for area in areas if isinstance(area, SimDoor)),
-                lift,
-                capped[2],
-                shapely.union_all([_polygon(area) for area in areas]) if areas else None,
-                areas[0].storey if areas else 0,
-            )
+
+    def __init__(
+        self,
+        doors: Sequence[SimDoor],
+        passages: Sequence[Passage],
+        lifts: Sequence[Lift],
+        limits: Sequence[SpeedLimit],
+    ) -> None:
+        self.lifts, self.limits = lifts, limits
+        self.shared: list[SimDoor | Passage] = [*doors, *passages]
+        self.areas = Areas([(_polygon(area), area.storey) for area in self.shared])
+        self.slow = Areas([(limit.polygon, limit.storey) for limit in limits])
+
+    def cut(self, line: Line) -> list[Stretch]:
+        """Return a line as stretches, in order."""
+        if not (self.shared or self.lifts or self.limits):
+            return [Stretch(line.points, line.storeys)]
+        sections = _sections(crossings(line.points, line.storeys, self.areas))
+        rides = _rides(line, self.lifts)
+        places = [place for begin, end, *_ in (*sections, *rides) for place in (begin, end)]
+        stretches, done = [], 0.0
+        for points, storeys in cut_at(line.points, line.storeys, places):
+            length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+            middle = done + length / 2
+            done += length
+            lift = next((lift for begin, end, lift in rides if begin <= middle <= end), None)
+            used = next((used for begin, end, used in sections if begin <= middle <= end), ())
+            stretches.append(self._stretch(points, storeys, [self.shared[k] for k in sorted(used)], lift))
+        return stretches
+
+    def _stretch(
+        self,
+        points: NDArray[np.float64],
+        storeys: NDArray[np.int32],
+        areas: Sequence[SimDoor | Passage],
+        lift: str | None,
+    ) -> Stretch:
+        capped = (points, storeys, None) if lift or not self.limits else self._limited(points, storeys)
+        return Stretch(
+            *capped[:2],
+            frozenset(name_of(area) for area in areas),
+            tuple(area for area in areas if isinstance(area, SimDoor)),
+            lift,
+            capped[2],
+            shapely.union_all([_polygon(area) for area in areas]) if areas else None,
+            areas[0].storey if areas else 0,
         )
-    return stretches
+
+    def _limited(
+        self, points: NDArray[np.float64], storeys: NDArray[np.int32]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32], tuple[float, ...] | None]:
+        """Put points where speed limits begin and end; return the limit of every piece, too."""
+        slow = crossings(points, storeys, self.slow)
+        if not slow:
+            return points, storeys, None
+        pieces = cut_at(points, storeys, [place for crossing in slow for place in (crossing.begin, crossing.end)])
+        speeds: list[float] = []
+        done = 0.0
+        for part, _ in pieces:
+            length = float(np.linalg.norm(np.diff(part, axis=0), axis=1).sum())
+            middle = done + length / 2
+            done += length
+            here = [self.limits[crossing.area].speed for crossing in slow if crossing.begin <= middle <= crossing.end]
+            speeds += [min(here, default=np.inf)] * (len(part) - 1)
+        line = np.concatenate([pieces[0][0], *(part[1:] for part, _ in pieces[1:])])
+        on = np.concatenate([pieces[0][1], *(floor[1:] for _, floor in pieces[1:])])
+        return line, on, tuple(speeds)
 
 
 def joined(stretches: Sequence[Stretch]) -> tuple[Line, tuple[float, ...] | None]:
@@ -189,24 +234,3 @@ def _rides(line: Line, lifts: Sequence[Lift]) -> list[tuple[float, float, str]]:
         else:
             rides.append((begin, end, lift.name))
     return rides
-
-
-def _limited(
-    points: NDArray[np.float64], storeys: NDArray[np.int32], limits: Sequence[SpeedLimit]
-) -> tuple[NDArray[np.float64], NDArray[np.int32], tuple[float, ...] | None]:
-    """Put points where speed limits begin and end; return the limit of every piece, too."""
-    slow = crossings(points, storeys, [(limit.polygon, limit.storey) for limit in limits])
-    if not slow:
-        return points, storeys, None
-    pieces = cut_at(points, storeys, [place for crossing in slow for place in (crossing.begin, crossing.end)])
-    speeds: list[float] = []
-    done = 0.0
-    for part, _ in pieces:
-        length = float(np.linalg.norm(np.diff(part, axis=0), axis=1).sum())
-        middle = done + length / 2
-        done += length
-        here = [limits[crossing.area].speed for crossing in slow if crossing.begin <= middle <= crossing.end]
-        speeds += [min(here, default=np.inf)] * (len(part) - 1)
-    line = np.concatenate([pieces[0][0], *(part[1:] for part, _ in pieces[1:])])
-    on = np.concatenate([pieces[0][1], *(floor[1:] for _, floor in pieces[1:])])
-    return line, on, tuple(speeds)

@@ -23,9 +23,10 @@ from bimnav.sim.incidents import Incident, Lookout
 from bimnav.sim.knowledge import Closure, Knowledge
 from bimnav.sim.lifts import Cabin
 from bimnav.sim.log import Event, EventKind
+from bimnav.sim.rehearsal import Rehearsal
 from bimnav.sim.routes import JOINED, Line, cell_near, way_between
 from bimnav.sim.setting import Decision, ServiceTime, Setting
-from bimnav.sim.stretches import Stretch, cut
+from bimnav.sim.stretches import Stretch
 from bimnav.sim.track import RobotStatus
 from bimnav.stops import Stop, Unreached
 
@@ -72,6 +73,7 @@ class World:
         self.parked: dict[int, Cell] = {}
         self.kept_clear: tuple[str, float] | None = None
         self.lookout = Lookout(self)
+        self.rehearsal = Rehearsal(setting, self.doors.values())
         self.charger_field: tuple[NavGraph, NDArray[np.float64]] | None = None
         ones = [*self.doors, *self.chargers]
         self.claims.left = {passage.name: passage.capacity for passage in setting.passages} | dict.fromkeys(ones, 1)
@@ -160,8 +162,7 @@ class World:
         """Cut a way where it needs a door, a passage or a lift, and where it is slow."""
         if self.is_plain:
             return [Stretch(line.points, line.storeys)]
-        doors, given = tuple(self.doors.values()), self.setting
-        return cut(line, doors, given.passages, given.lifts if agent.robot.uses_lifts else (), given.limits)
+        return self.rehearsal.cut(line, uses_lifts=agent.robot.uses_lifts)
 
     def passable(self, agent: Driver, stretches: Sequence[Stretch]) -> int:
         """Return how many stretches a robot drives in one go if what they need is free.
@@ -243,6 +244,11 @@ class World:
         return None
 
     # --- what happens to the world
+
+    def set_door(self, door: SimDoor) -> None:
+        """Put a door in another state."""
+        self.doors[door.global_id] = door
+        self.rehearsal.change(self.doors.values())
 
     def close(self, closure: Closure) -> None:
         """Let everybody know that floor is closed."""
