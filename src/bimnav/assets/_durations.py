@@ -69,6 +69,7 @@ def _spelled(text: str) -> str:
 
 
 def day_of(text: str) -> date | None:
+    """Read the day that a text begins with; None if it does not begin with one."""
     found = _DATE.match(text)
     try:
         return date(*map(int, found.groups())) if found else None

@@ -42,6 +42,7 @@ class Neighbor(NamedTuple):
 
 
 def neighbors_of(building: Building, facts: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, tuple[Neighbor, ...]]:
+    """Return the neighbors that the files name, by which way they lie."""
     found: dict[str, tuple[Neighbor, ...]] = {}
     for way in ("upstream", "downstream", "connected"):
         ids = dict.fromkeys(global_id for _, told in facts for global_id in told.get(way, ()))

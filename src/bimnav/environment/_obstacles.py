@@ -23,6 +23,7 @@ __all__ = ["closed_doors", "obstacles_of", "zones_of"]
 def obstacles_of(
     candidates: Sequence[tuple[Element, str]], robot: Robot, levels: Sequence[float], walkable: Sequence[int]
 ) -> Iterable[Obstacle]:
+    """Yield what elements, each with the reason why it blocks, take from the floor of every walkable storey."""
     shapes = [(element, why, shape) for element, why in candidates for shape in element.shapes]
     for storey in walkable:
         low, high = levels[storey] + robot.low, levels[storey] + robot.height

@@ -69,6 +69,7 @@ def _weave(points: NDArray[np.float64], faces: NDArray[np.int32], quality: str) 
 
 
 def worst(qualities: Iterable[str]) -> str:
+    """Return the worst of some qualities."""
     return max(qualities, key=_QUALITIES.index)
 
 

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bimnav.graph import NavGraph
+from bimnav.grid import Cell, nearest_cell
+from bimnav.plan.legs import legs_between, seconds_at
+from bimnav.plan.paths import distance_matrix
 from bimnav.robot import Robot
+from bimnav.stops import Stop
 
-__all__ = ["RESERVE", "Charge", "Charging", "plan_charging"]
+__all__ = ["RESERVE", "Charge", "Charging", "find_chargers", "plan_charging", "with_charging"]
 
 RESERVE = 0.1  # of the battery, kept for what the plan does not know: turns, starts, waiting
 
 _JOULES = 3600.0  # in a watt hour
+_DOCK = 3.0  # metres from a dock at which a robot charges
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,3 +139,61 @@ def plan_charging(
             (float(there[charger, stops] + back[charger, stops] - way[stops]), energy / _JOULES, energy / rate)
         )
     return Charging(tuple(visits[::-1]), tuple(charges[::-1]), end)
+
+
+def find_chargers(graph: NavGraph, start: Cell) -> tuple[Stop, ...]:
+    """Return the docks of the task that can be reached from a start, each as a stop on the nearest free cell."""
+    environment = graph.environment
+    if environment is None:
+        return ()
+    from bimnav.tasks import match
+
+    reachable = graph.components == graph.components[start]
+    chargers = []
+    for rule in environment.task.docks:
+        for dock, _ in match(rule, environment.building):
+            if dock.bounds is None:
+                continue
+            x, y = dock.bounds[:, :2].mean(axis=0).tolist()
+            storey = graph.frame.storey_at(float(dock.bounds[0, 2]))
+            near = nearest_cell(graph.frame, reachable[storey], storey, x, y)
+            if near is None or near[1] > _DOCK:
+                continue
+            cell, away = near
+            point = graph.frame.center_of(cell)
+            destination = (x, y, point[2])
+            chargers.append(Stop(dock.global_id, dock.name, cell, destination, point, "standing", away, kind="charger"))
+    return tuple(chargers)
+
+
+def with_charging(
+    graph: NavGraph,
+    start: Cell,
+    goal: Cell | None,
+    visits: tuple[Stop, ...],
+    robot: Robot,
+    chargers: tuple[Stop, ...],
+) -> tuple[tuple[Stop, ...], tuple[Charge, ...], tuple[Stop, ...]]:
+    """Return the stops with visits to chargers in between, what those cost, and the stops that cannot be done."""
+    for count in range(len(visits), -1, -1):  # the most stops after which it still gets where it should end
+        cells = [start, *(stop.cell for stop in visits[:count]), *([] if goal is None else [goal])]
+        n = len(cells)
+        places = [*cells, *(charger.cell for charger in chargers)]
+        metres = legs_between(graph, places, distance_matrix(graph, places), robot).metres
+        service = [seconds_at(graph, stop) for stop in visits[:count]] + [0.0] * (n - 1 - count)
+        back = np.roll(metres[n:, :n], -1, axis=1)  # column k leads to stop k
+        found = plan_charging(robot, np.diagonal(metres, 1)[: n - 1], service, metres[:n, n:].T, back)
+        if found.done == n - 1:
+            break
+    along: list[Stop] = []
+    charges = []
+    planned = dict(zip(found.visits, found.charges, strict=True))
+    for done in range(count + 1):
+        for (after, which), (detour, energy, seconds) in planned.items():
+            if after == done:
+                charger = chargers[which]
+                charges.append(Charge(charger.global_id, charger.name, len(along), detour, energy, seconds))
+                along.append(replace(charger, service_time=seconds))
+        if done < count:
+            along.append(visits[done])
+    return tuple(along), tuple(charges), visits[count:]

@@ -1,4 +1,4 @@
-"""How long the ways between cells are, in metres and in seconds, whatever they make least."""
+"""How long the ways between cells are, in metres and in seconds, whatever they make least; and the work at stops."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from bimnav.graph import NavGraph
     from bimnav.grid import Cell
     from bimnav.robot import Robot
+    from bimnav.stops import Stop
 
-__all__ = ["Legs", "legs_between", "seconds_along"]
+__all__ = ["Legs", "legs_between", "seconds_along", "seconds_at"]
 
 
 class Legs(NamedTuple):
@@ -58,3 +59,10 @@ def seconds_along(path: Path, robot: Robot) -> float:
     on_links = sum(link.length for _, link in path.rides)
     rides = sum(path.graph.seconds_over(link, robot) for _, link in path.rides)
     return (path.length - on_links) / robot.speed + rides
+
+
+def seconds_at(graph: NavGraph, stop: Stop) -> float:
+    """Return how long a robot works at a stop: what the stop says, else the task."""
+    if stop.service_time is not None:
+        return stop.service_time
+    return 0.0 if graph.environment is None else graph.environment.task.service_time

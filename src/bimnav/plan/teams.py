@@ -14,9 +14,9 @@ from bimnav.errors import InputError
 from bimnav.graph import NavGraph
 from bimnav.grid import Cell
 from bimnav.plan.assignment import Objective, assign_stops
-from bimnav.plan.legs import legs_between, seconds_along
+from bimnav.plan.legs import legs_between, seconds_along, seconds_at
 from bimnav.plan.paths import Algorithm, distance_matrix, free_index
-from bimnav.plan.tours import Tour, explained, near_stands, seconds_at, tour_over, why_unreached
+from bimnav.plan.tours import Tour, explained, near_stands, tour_over, why_unreached
 from bimnav.robot import Robot
 from bimnav.stops import Stand, Stop, Unreached, given_up
 

@@ -17,9 +17,9 @@ from bimnav._kept import Kept
 from bimnav._why import why_unreachable
 from bimnav.errors import InputError
 from bimnav.graph import NavGraph
-from bimnav.grid import Cell, nearest_cell
-from bimnav.plan.charging import Charge, plan_charging
-from bimnav.plan.legs import legs_between
+from bimnav.grid import Cell
+from bimnav.plan.charging import Charge, find_chargers, with_charging
+from bimnav.plan.legs import legs_between, seconds_at
 from bimnav.plan.orders import gap_of, order_stops
 from bimnav.plan.paths import (
     Algorithm,
@@ -35,14 +35,13 @@ from bimnav.robot import Robot
 from bimnav.smooth import turns_of
 from bimnav.stops import Stand, Stop, Unreached, given_up
 
-__all__ = ["Tour", "find_chargers", "near_stands", "plan_tour", "seconds_at", "tour_over", "why_unreached"]
+__all__ = ["Tour", "find_chargers", "near_stands", "plan_tour", "tour_over", "why_unreached"]
 
 Point: TypeAlias = tuple[float, float, float]
 
 _SAME_POINT = 1e-9  # metres
 _FARTHER = 0.5  # metres from its target that a place may be beyond the nearest, if it shortens the tour
 _ROUNDING = 1e-9  # relative
-_DOCK = 3.0  # metres from a dock at which a robot charges
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +317,7 @@ def _driven(
     unreached, charges = list(tour.unreached), tour.charges
     if math.isfinite(robot.battery_wh):
         known = find_chargers(graph, start) if chargers is None else tuple(chargers)
-        visits, charges, flat = _charged(graph, start, goal, visits, robot, known)
+        visits, charges, flat = with_charging(graph, start, goal, visits, robot, known)
         for stop in flat:
             reason = f"the battery of {robot.battery_wh:g} Wh does not last, and no charger is near enough"
             unreached.append(given_up(stop, reason))
@@ -408,71 +407,6 @@ def _ordered(
     along = [*order.order, *([0] if return_to_start else [])]
     is_optimal = math.fsum(cost[along[:-1], along[1:]].tolist()) <= bound * (1 + _ROUNDING)
     return _Ordered(tuple(visits), late, bound, is_optimal)
-
-
-def seconds_at(graph: NavGraph, stop: Stop) -> float:
-    """Return how long a robot works at a stop: what the stop says, else the task."""
-    if stop.service_time is not None:
-        return stop.service_time
-    return 0.0 if graph.environment is None else graph.environment.task.service_time
-
-
-def find_chargers(graph: NavGraph, start: Cell) -> tuple[Stop, ...]:
-    """Return the docks of the task that can be reached from a start, each as a stop on the nearest free cell."""
-    environment = graph.environment
-    if environment is None:
-        return ()
-    from bimnav.tasks import match
-
-    reachable = graph.components == graph.components[start]
-    chargers = []
-    for rule in environment.task.docks:
-        for dock, _ in match(rule, environment.building):
-            if dock.bounds is None:
-                continue
-            x, y = dock.bounds[:, :2].mean(axis=0).tolist()
-            storey = graph.frame.storey_at(float(dock.bounds[0, 2]))
-            near = nearest_cell(graph.frame, reachable[storey], storey, x, y)
-            if near is None or near[1] > _DOCK:
-                continue
-            cell, away = near
-            point = graph.frame.center_of(cell)
-            destination = (x, y, point[2])
-            chargers.append(Stop(dock.global_id, dock.name, cell, destination, point, "standing", away, kind="charger"))
-    return tuple(chargers)
-
-
-def _charged(
-    graph: NavGraph,
-    start: Cell,
-    goal: Cell | None,
-    visits: tuple[Stop, ...],
-    robot: Robot,
-    chargers: tuple[Stop, ...],
-) -> tuple[tuple[Stop, ...], tuple[Charge, ...], tuple[Stop, ...]]:
-    """Return the stops with visits to chargers in between, what those cost, and the stops that cannot be done."""
-    for count in range(len(visits), -1, -1):  # the most stops after which it still gets where it should end
-        cells = [start, *(stop.cell for stop in visits[:count]), *([] if goal is None else [goal])]
-        n = len(cells)
-        places = [*cells, *(charger.cell for charger in chargers)]
-        metres = legs_between(graph, places, distance_matrix(graph, places), robot).metres
-        service = [seconds_at(graph, stop) for stop in visits[:count]] + [0.0] * (n - 1 - count)
-        back = np.roll(metres[n:, :n], -1, axis=1)  # column k leads to stop k
-        found = plan_charging(robot, np.diagonal(metres, 1)[: n - 1], service, metres[:n, n:].T, back)
-        if found.done == n - 1:
-            break
-    along: list[Stop] = []
-    charges = []
-    planned = dict(zip(found.visits, found.charges, strict=True))
-    for done in range(count + 1):
-        for (after, which), (detour, energy, seconds) in planned.items():
-            if after == done:
-                charger = chargers[which]
-                charges.append(Charge(charger.global_id, charger.name, len(along), detour, energy, seconds))
-                along.append(replace(charger, service_time=seconds))
-        if done < count:
-            along.append(visits[done])
-    return tuple(along), tuple(charges), visits[count:]
 
 
 def explained(graph: NavGraph, start: Cell, unreached: Iterable[Unreached]) -> list[Unreached]:

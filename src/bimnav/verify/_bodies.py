@@ -38,6 +38,7 @@ class Body:
 
 
 def make_body(element: Element) -> Body | None:
+    """Join the shapes of an element; None if it has no faces."""
     shapes = [(shape.world_vertices(), shape.mesh) for shape in element.shapes if len(shape.mesh.faces)]
     if not shapes:
         return None  # an empty mesh would end the process

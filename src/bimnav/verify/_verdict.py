@@ -137,6 +137,7 @@ def refusal(
     storey: int | None = None,
     leg: int | None = None,
 ) -> Violation:
+    """Return a violation; its message ends with the place, and with the leg if there is one."""
     point = None
     if place is not None:
         x, y, z = np.asarray(place, dtype=np.float64).tolist()
@@ -146,5 +147,6 @@ def refusal(
 
 
 def who(owner: Owner) -> str:
+    """Name an element in a sentence."""
     global_id, name = owner
     return f"{name or 'an unnamed element'} ({global_id})" if global_id else name

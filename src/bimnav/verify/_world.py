@@ -65,6 +65,7 @@ class Way:
 
 
 def surroundings(environment: IndoorEnvironment, ignore: Collection[str]) -> World:
+    """Return what an environment holds against a path; obstacles of the GlobalIds in `ignore` do not count."""
     building, robot = environment.building, environment.robot
     levels = np.asarray(environment.levels, dtype=np.float64)
     first = _first_at(levels)
