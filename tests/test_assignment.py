@@ -256,3 +256,10 @@ def test_a_team_that_obeys_priorities_does_not_claim_the_optimum_without_them():
     plan = plan_tours(graph, [Cell(0, 0, 0)], stops)
     assert [stop.name for stop in plan.tours[0].stops] == ["far", "near"]
     assert not plan.is_optimal
+
+
+def test_alternatives_that_take_different_amounts_are_refused():
+    matrix = [[0, 1, 5], [1, 0, 1], [5, 1, 0]]
+    with pytest.raises(InputError, match="different amounts"):
+        assign_stops(matrix, [0], groups=[0, 1, 1], demands=[0, 3, 1], capacities=[2])
+    assert assign_stops(matrix, [0], groups=[0, 1, 1], demands=[0, 1, 1], capacities=[2]).routes == ((0, 1),)

@@ -98,7 +98,7 @@ def assign_stops(
     groups : (n,) int
         Rows with the same number are alternatives: one of them is visited. None for every row.
     demands : (n,) float
-        What each row takes of a robot's capacity, at least 0.
+        What each row takes of a robot's capacity, at least 0; the rows of a group all the same.
     capacities : (robots,) float
         How much each robot can take.
     allowed : (robots, n) bool
@@ -131,6 +131,8 @@ def assign_stops(
     needs = None if demands is None else _numbers("demands", demands, (n,))
     if (needs is None) != (robots.capacities is None):
         raise InputError("demands and capacities go together.", "Give both or neither.")
+    if needs is not None and any(np.ptp(needs[way]) > 0 for way in ways):
+        raise InputError("rows of one group take different amounts.", "Give alternatives the same demand.")
     group = np.repeat(np.arange(len(ways)), [len(way) for way in ways]).astype(np.int64)
     if len(ways) <= _FEW and search.is_small(group):
         routes, is_cut_short = _shared_out(robots, ways, group, needs, objective), False
