@@ -97,6 +97,7 @@ def world(apartment):
     tour = bn.plan_tour(graph, start)
     return SimpleNamespace(
         building=apartment.building,
+        task=apartment.task,
         environment=apartment,
         graph=graph,
         start=start,
@@ -176,6 +177,20 @@ MATRIX = [[0, 1], [1, 0]]
         ("task is 3, not a path", lambda w: bn.load_task(3)),
         ("robot is 3, not a path", lambda w: bn.load_robot(3)),
         ("keys is 3, not a list", lambda w: bn.Robot(keys=3)),
+        (
+            "floor_from has 'spaces'. Known are space",
+            lambda w: bn.make_environment(w.building, w.task, floor_from=["spaces"]),
+        ),
+        ("global_id is 3, not a str", lambda w: w.building.properties(3)),
+        ("global_id is 3", lambda w: w.environment.explain(3)),
+        ("kind is 3", lambda w: w.building.asset(w.building.elements[0].global_id).find_upstream(3)),
+        ("filter is 3", lambda w: bn.Rule(3)),
+        ("name is None", lambda w: bn.Task(None, "")),
+        ("tasks_path is 3, not a list", lambda w: bn.list_tasks(tasks_path=3)),
+        ("robots_path is None, not a path", lambda w: bn.list_robots(robots_path=[None])),
+        ("cache is 3, not a path", lambda w: bn.read_ifc(bn.sample("apartment"), cache=3)),
+        ("x is 'a', not a number", lambda w: bn.topology(w.graph).place_at("a", 0, 0)),
+        ("points is 'a'", lambda w: bn.topology(w.graph).along("a")),
         # simulation
         ("plan is 'tour', not a Tour", lambda w: bn.simulate("tour")),
         ("graph is 3", lambda w: bn.simulate(w.tour, 3)),
@@ -201,6 +216,8 @@ MATRIX = [[0, 1], [1, 0]]
         ("values is 3, not a list", lambda w: bn.Chance("uniform", 3, "s")),
         ("time is 'a', not a number", lambda w: w.result.state_at("a")),
         ("path is 3, not a path", lambda w: w.result.to_html(3)),
+        ("step is 'a'", lambda w: w.result.trajectory("a")),
+        ("height is 'a'", lambda w: w.result.show(height="a")),
         # studies
         ("environment is None", lambda w: bn.study(None, starts=[(3.1, 15.9)])),
         ("starts is 3, not a list", lambda w: bn.study(w.environment, starts=3)),
@@ -213,6 +230,7 @@ MATRIX = [[0, 1], [1, 0]]
         # checks
         ("tour is None, not a Tour", lambda w: bn.check_plan(None)),
         ("points is 'a', not an array", lambda w: bn.check_path("a", w.environment)),
+        ("ignore is 3, not a list", lambda w: bn.check_path(w.tour.route[0], w.environment, ignore=3)),
         ("environment is None", lambda w: bn.check_poses([[0, 0, 0, 0]], None)),
         # figures
         ("building is 3, not a Building", lambda w: bn.plot_building(3)),

@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
+from bimnav import _checks
 from bimnav._toml import Problem
 from bimnav.errors import FileKindError, FileMissingError, FileTooLargeError, InputError
 
@@ -61,7 +62,8 @@ class TableFiles:
         FileMissingError, FileKindError, FileTooLargeError
             If a folder or file cannot be read.
         """
-        wanted = [Path(entry) for entry in folders]
+        name = f"{self.kind}s_path"
+        wanted = [_checks.path(name, entry) for entry in _checks.many(name, folders)]
         wanted += [Path(entry) for entry in os.environ.get(self.variable, "").split(os.pathsep) if entry]
         paths = dict.fromkeys(path for entry in wanted for path in self._files_at(entry))
         return [(self.text_of(path), str(path)) for path in paths]

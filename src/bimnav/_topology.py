@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bimnav import _checks
 from bimnav._why import FIXED
-from bimnav.errors import NothingWalkableError
+from bimnav.errors import InputError, NothingWalkableError
 
 if TYPE_CHECKING:
     import rustworkx
@@ -97,7 +97,7 @@ class Topology:
         return None if found is None else self.places[found]
 
     def _number_at(self, x: float, y: float, storey: int) -> int | None:
-        point = shapely.Point(x, y)
+        point = shapely.Point(_checks.number("x", x), _checks.number("y", y))
         here = [
             (region.polygon.distance(point), k)
             for k, region in enumerate(self.regions)
@@ -125,6 +125,8 @@ class Topology:
         """
         import rustworkx
 
+        for name, place in (("start", start), ("goal", goal)):
+            _checks.point(name, place)
         begin, end = self._number_at(*start), self._number_at(*goal)
         if begin is None or end is None:
             return None
@@ -138,7 +140,10 @@ class Topology:
 
     def along(self, points: ArrayLike) -> tuple[Node, ...]:
         """Return the doors and connectors that a polyline, (n, 3) metres, passes, in its order."""
-        line = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        line = _checks.numbers("points", points)
+        if line.size and (line.ndim != 2 or line.shape[1] != 3):
+            raise InputError(f"points is of shape {line.shape}.", "Give (n, 3) metres.")
+        line = line.reshape(-1, 3)
         passed: list[tuple[float, int]] = []
         for k, (place, region) in enumerate(zip(self.places, self.regions, strict=True)):
             if place.kind == "space":

@@ -452,16 +452,19 @@ class Building:
 
     def properties(self, global_id: str) -> Mapping[str, Mapping[str, Any]]:
         """Return the property sets of a product, `{set: {property: value}}`, as the file writes them."""
+        _checks.need("global_id", global_id, str)
         return {} if self.property_reader is None else self.property_reader(global_id)
 
     def facts(self, global_id: str) -> Facts:
         """Return what the model says of a product: its own properties and its type's, classifications, systems."""
+        _checks.need("global_id", global_id, str)
         if self.facts_reader is not None:
             return self.facts_reader(global_id)
         return Facts(self.properties(global_id))
 
     def properties_by_source(self, global_id: str) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
         """Return the property sets of a product file by file, `{path: {set: {property: value}}}`."""
+        _checks.need("global_id", global_id, str)
         readers = self.property_readers
         if not readers and self.property_reader:
             readers = {self.sources[0] if self.sources else self.name: self.property_reader}

@@ -9,6 +9,7 @@ from datetime import date
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
+from bimnav import _checks
 from bimnav.assets._durations import day_of
 from bimnav.assets._flow import Neighbor, find_along
 from bimnav.building import Building
@@ -158,6 +159,7 @@ class Asset:
         return self._find("downstream", kind)
 
     def _find(self, way: Literal["upstream", "downstream"], kind: str) -> tuple[Neighbor, ...]:
+        _checks.need("kind", kind, str)
         return () if self.building is None else find_along(self.building, self.global_id, way, kind)
 
     def to_dict(self) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from bimnav.environment._values import (
     Zone,
     grown as grown,
 )
+from bimnav.errors import ValueRangeError
 from bimnav.robot import Robot
 
 if TYPE_CHECKING:
@@ -72,6 +73,9 @@ def make_environment(
     _checks.need("building", building, Building)
     _checks.need("task", task, Task)
     _checks.need("robot", robot, Robot)
+    unknown = [source for source in _checks.many("floor_from", floor_from, str) if source not in FLOOR_SOURCES]
+    if unknown:
+        raise ValueRangeError(f"floor_from has {unknown[0]!r}.", f"Known are {', '.join(FLOOR_SOURCES)}.")
     floors, issues = find_floors(building, robot, sources=floor_from, outdoors=outdoors)
     issues += lint_rules(task, building)
     levels = tuple(floor.level for floor in floors)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal, Self
 import numpy as np
 import shapely
 
+from bimnav import _checks
 from bimnav._door_access import DoorAccess
 from bimnav._floors import FloorSource
 from bimnav.building import Building, Issue, Storey
@@ -304,6 +305,7 @@ class IndoorEnvironment:
         """
         from bimnav._explain import explain_element
 
+        _checks.need("global_id", global_id, str)
         return explain_element(self, global_id)
 
     def is_clear(self, storey: int, *points: Sequence[float]) -> bool:

@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bimnav import _checks
 from bimnav._progress import Display, Progress
 from bimnav.errors import CacheError, InputError
 
@@ -133,7 +134,7 @@ def _cache_at(cache: bool | str | PathLike[str]) -> Cache | None:
     if cache is False:
         return None
     try:
-        return Cache(cache_folder() if cache is True else Path(cache))
+        return Cache(cache_folder() if cache is True else _checks.path("cache", cache))
     except CacheError as error:
         _LOG.warning("nothing is cached: %s", error)
         return None

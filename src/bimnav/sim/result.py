@@ -291,6 +291,7 @@ class SimResult:
 
     def present_targets(self, time: float) -> tuple[str, ...]:
         """Return the GlobalIds of the targets that are still there at a time; what was served is gone."""
+        time = _checks.number("time", time)
         gone = {row.target for row in self.log if row.event == "remove" and row.time <= time}
         return tuple(target for target in self.targets if target not in gone)
 
@@ -344,6 +345,7 @@ class SimResult:
         """
         import html
 
+        _checks.whole("height", height, 1)
         try:
             from IPython import display
         except ImportError as error:
@@ -374,6 +376,8 @@ class SimResult:
             Fields `time` (s), `x`, `y`, `z` (m), `heading` (rad) and `status` (text); times rise, and the
             last row is the end.
         """
+        if step is not None:
+            _checks.number("step", step)
         return self.track_of(robot).trajectory(step)
 
     def trajectories(self, step: float | None = None) -> NDArray[Any]:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias, get_args
 
+from bimnav import _checks
 from bimnav.errors import TaskError
 from bimnav.tasks._conditions import parse_condition
 from bimnav.tasks._words import tokens
@@ -202,6 +203,7 @@ class Rule:
             object.__setattr__(self, name, checked_words(getattr(self, name)))
         object.__setattr__(self, "properties", checked_conditions(self.properties))
         object.__setattr__(self, "destination", checked_destination("destination", self.destination))
+        _checks.need("filter", self.filter, str)
         if not self.filter.strip():
             raise TaskError("a rule has an empty filter.", "IfcElement picks every element.")
         if not 1 <= self.factor < math.inf:
@@ -314,6 +316,7 @@ class Task:
     def __post_init__(self) -> None:
         for name in RULE_LISTS:
             object.__setattr__(self, name, _rules(name, getattr(self, name)))
+        _checks.need("name", self.name, str)
         if not self.name.strip():
             raise TaskError("a task has no name.")
         told = f"task {self.name!r}: "

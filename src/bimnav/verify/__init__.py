@@ -63,7 +63,7 @@ def check_path(
         If `points` has another shape. Points that are not finite are a violation.
     """
     _checks.need("environment", environment, "IndoorEnvironment")
-    return _judge([(None, _polyline(points))], surroundings(environment, ignore), body, [])
+    return _judge([(None, _polyline(points))], surroundings(environment, _checks.many("ignore", ignore, str)), body, [])
 
 
 def check_plan(tour: Tour) -> Check:
