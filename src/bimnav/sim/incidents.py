@@ -68,9 +68,8 @@ class Lookout:
         for name, (seconds, kind) in self._looked(agent, motion).items():
             if name in self.world.hidden and passed <= seconds < motion.duration:
                 found.append(Incident(seconds, "contact" if kind == "contact" else "sense", self.world.hidden[name]))
-        on = set(motion.storeys.tolist()) if self.world.setting.walkers else ()
         for walker in self.world.setting.walkers:
-            if walker.person.storey not in on:
+            if walker.person.storey not in motion.floors:
                 continue
             moment = self._stop_for(agent, motion, begin, passed, walker)
             if moment is not None:
@@ -90,7 +89,7 @@ class Lookout:
         braking = agent.cruise / agent.robot.acceleration
         latest = max(meeting - braking, passed)
         moments = latest - np.arange(math.floor((latest - passed) / _STEP) + 1) * _STEP
-        places = shapely.points([motion.point_at(moment + braking / 2)[:2] for moment in moments.tolist()])
+        places = shapely.points(motion.points_at(np.asarray(moments + braking / 2))[:, :2])
         way = walker.way(begin + passed, begin + meeting + _FORESIGHT)
         line = shapely.LineString(way) if len(way) > 1 else shapely.Point(way[0])
         safe = np.flatnonzero(shapely.distance(places, line) >= distance)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Closure", "Knowledge"]
 
+_MOST = 64  # graphs remembered; what one robot alone avoids makes new ones
 _TOUCH = 1e-6  # metres; a way along the edge of what is closed is open
 
 
@@ -71,17 +72,40 @@ class Knowledge:
 
     closures: dict[str, Closure] = field(default_factory=dict)
     leeway: float = 0.0
-    _graphs: dict[tuple[int, tuple[int, ...]], NavGraph] = field(default_factory=dict)
+    _graphs: dict[tuple[int, tuple[int, ...]], tuple[tuple[Closure, ...], NavGraph]] = field(default_factory=dict)
+    _heeded: dict[int, tuple[Robot, tuple[Closure, ...]]] = field(default_factory=dict)
+    _bodies: dict[tuple[str, float], BaseGeometry] = field(default_factory=dict)
 
     def add(self, closure: Closure) -> None:
         """Learn that floor is closed."""
+        self._forget()
         self.closures[closure.name] = closure
-        self._graphs.clear()
 
     def remove(self, name: str) -> Closure | None:
         """Learn that floor is open again; return what was closed."""
-        self._graphs.clear()
+        self._forget()
         return self.closures.pop(name, None)
+
+    def _forget(self) -> None:
+        self._graphs.clear()
+        self._heeded.clear()
+        self._bodies.clear()
+
+    def heeded_by(self, robot: Robot) -> tuple[Closure, ...]:
+        """Return the closures that stop a robot."""
+        if id(robot) not in self._heeded:
+            stopping = tuple(closure for closure in self.closures.values() if closure.stops(robot))
+            self._heeded[id(robot)] = robot, stopping
+        return self._heeded[id(robot)][1]
+
+    def _body(self, closure: Closure, robot: Robot) -> BaseGeometry:
+        """Return where the middle of a robot cannot be, but for its edge."""
+        key = (closure.name, robot.radius)
+        if self.closures.get(closure.name) is not closure:
+            return closure.body(robot).buffer(-_TOUCH)
+        if key not in self._bodies:
+            self._bodies[key] = closure.body(robot).buffer(-_TOUCH)
+        return self._bodies[key]
 
     def in_way(
         self,
@@ -101,11 +125,14 @@ class Knowledge:
         held
             Names of doors the robot stands in; it goes on through them.
         """
-        every = [*self.closures.values(), *([besides] if besides else [])]
+        every = self.heeded_by(robot)
+        if besides is not None and besides.stops(robot):
+            every = (*every, besides)
+        on = set(storeys.tolist())
         for closure in every:
-            if closure.name in held or not closure.stops(robot) or not (storeys == closure.storey).any():
+            if closure.name in held or closure.storey not in on:
                 continue
-            body = closure.body(robot).buffer(-_TOUCH)
+            body = self._body(closure, robot)
             line = shapely.LineString(points[:, :2]) if len(points) > 1 else shapely.Point(points[0, :2])
             leeway = None if closure.is_held else self.leeway
             if shapely.intersects(line, body) and _stops_at(points, storeys, closure.storey, body, leeway):
@@ -114,9 +141,9 @@ class Knowledge:
 
     def graph_for(self, graph: NavGraph, robot: Robot, besides: Closure | None = None) -> NavGraph:
         """Return the graph of a robot with everything closed that it knows of."""
-        active = [closure for closure in self.closures.values() if closure.stops(robot)]
+        active = self.heeded_by(robot)
         if besides is not None:
-            active.append(besides)
+            active = (*active, besides)
         if not active:
             return graph
         key = (id(graph), tuple(id(closure) for closure in active))
@@ -126,8 +153,10 @@ class Knowledge:
                 for closure in active
                 for row, col in np.argwhere(rasterize(graph.frame, closure.body(robot))).tolist()
             ]
-            self._graphs[key] = graph.block(closed)
-        return self._graphs[key]
+            if len(self._graphs) >= _MOST:
+                self._graphs.clear()
+            self._graphs[key] = active, graph.block(closed)  # who is told apart by identity has to live on
+        return self._graphs[key][1]
 
 
 def _stops_at(

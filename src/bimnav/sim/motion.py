@@ -7,17 +7,38 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bimnav.robot import Robot
 
-__all__ = ["Motion", "drive", "rest", "stand"]
+__all__ = ["Chords", "Motion", "drive", "rest", "stand"]
 
 _SAME_POINT = 1e-9  # metres
 _NOW, _EVEN = np.zeros(1), np.ones(1)
+_CHORDS = 8  # straight pieces an accelerated row is cut into
 _STRAIGHT = 1e-6  # radians; a smaller change of direction is rounding
+
+
+class Chords(NamedTuple):
+    """A motion in plan view as straight pieces at constant speed.
+
+    Parameters
+    ----------
+    times : (n,) float64, seconds since it began
+    points : (n, 2) float64, metres
+    reached : (n,) float64, metres driven
+    low, high : (2,) float64, metres
+        The box around it.
+    """
+
+    times: NDArray[np.float64]
+    points: NDArray[np.float64]
+    reached: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +113,33 @@ class Motion:
         """Return where the robot is some seconds after the begin, (3,) metres."""
         return self._inside(seconds)[1]
 
+    def points_at(self, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where the robot is at several times after the begin: (m,) to (m, 3) metres."""
+        if len(self.times) == 1:
+            return np.repeat(self.points, len(seconds), axis=0)
+        rows = np.maximum(np.searchsorted(self.times, seconds, side="right") - 1, 0)
+        over, rows = rows >= len(self.times) - 1, np.minimum(rows, len(self.times) - 2)
+        begin, end = self.points[rows], self.points[rows + 1]
+        spans = self.times[rows + 1] - self.times[rows]
+        share = np.divide(seconds - self.times[rows], spans, out=np.zeros(len(rows)), where=spans > 0)
+        ease = self.eases[rows]
+        points: NDArray[np.float64] = begin + (share * (ease + (1 - ease) * share))[:, None] * (end - begin)
+        points[over] = self.points[-1]
+        return points
+
+    @cached_property
+    def floors(self) -> frozenset[int]:
+        """Indexes of the storeys it touches."""
+        return frozenset(self.storeys.tolist())
+
+    @cached_property
+    def chords(self) -> Chords:
+        """The motion in plan view as straight pieces at constant speed."""
+        times, points = _straight(self)
+        steps = points[1:] - points[:-1]
+        reached = np.append(0.0, np.linalg.norm(steps, axis=1).cumsum())
+        return Chords(times, points, reached, points.min(axis=0), points.max(axis=0))
+
     def _inside(self, seconds: float) -> tuple[int, NDArray[np.float64], float]:
         """Return row, point and speed at a time."""
         row = self.row_at(seconds)
@@ -128,6 +176,22 @@ class Motion:
         storeys = np.concatenate([head[2], np.full(len(tail[0]), self.storeys[row], dtype=np.int32)])
         length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         return Motion(times, points, storeys, np.concatenate([eases, tail[2]]), turns, length)
+
+
+def _straight(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return times and points in plan view of a motion, accelerated rows cut into chords."""
+    curved = np.flatnonzero(motion.eases[:-1] != 1)
+    if not len(curved):
+        return motion.times, motion.points[:, :2]
+    share = np.arange(1, _CHORDS) / _CHORDS
+    spans, ways = np.diff(motion.times), np.diff(motion.points[:, :2], axis=0)
+    ease = motion.eases[curved, None]
+    driven = share * (ease + (1 - ease) * share)
+    times = (motion.times[curved, None] + share * spans[curved, None]).ravel()
+    points = (motion.points[curved, None, :2] + driven[..., None] * ways[curved, None]).reshape(-1, 2)
+    every, where = np.concatenate([motion.times, times]), np.concatenate([motion.points[:, :2], points])
+    order = np.argsort(every, kind="stable")
+    return every[order], where[order]
 
 
 def _braking(

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Person", "Walker", "first_meeting"]
 
-_CHORDS = 8  # straight pieces an accelerated row is cut into
-
 
 @dataclass(frozen=True, slots=True)
 class Person:
@@ -176,22 +174,25 @@ def first_meeting(motion: Motion, begin: float, walker: Walker, distance: float)
     seconds
         Since the begin of the motion; None if they never do, or only move apart.
     """
-    if not (motion.storeys == walker.person.storey).any():
+    if walker.person.storey not in motion.floors:
         return None
-    own_times, own_points = _straight(motion)
+    own = motion.chords
     times, points = walker.between(begin, begin + motion.duration)
     times = times - begin
     low, high = max(float(times[0]), 0.0), min(float(times[-1]), motion.duration)
-    if low >= high or not _near(own_points, points, distance):
+    apart = np.maximum(own.low - points.max(axis=0), points.min(axis=0) - own.high)
+    if low >= high or (apart > distance).any():
         return None
-    moments = np.unique(np.concatenate([[low, high], own_times, times]))
-    moments = moments[(moments >= low) & (moments <= high)]
-    gap = _at(moments, own_times, own_points) - _at(moments, times, points)
-    span = np.diff(moments)
-    moving = np.diff(np.interp(moments, own_times, _driven(own_points))) > 0
-    rate = np.diff(gap, axis=0) / span[:, None]
-    gap = gap[:-1]
-    a, b, c = (rate**2).sum(axis=1), (gap * rate).sum(axis=1), (gap**2).sum(axis=1) - distance**2
+    moments = np.sort(np.concatenate([[low, high], own.times, times]))
+    kept = (moments >= low) & (moments <= high)
+    kept[1:] &= moments[1:] != moments[:-1]
+    moments = moments[kept]
+    span = moments[1:] - moments[:-1]
+    x, y = (np.interp(moments, own.times, own.points[:, k]) - np.interp(moments, times, points[:, k]) for k in (0, 1))
+    reached = np.interp(moments, own.times, own.reached)
+    moving = reached[1:] - reached[:-1] > 0
+    vx, vy, x, y = (x[1:] - x[:-1]) / span, (y[1:] - y[:-1]) / span, x[:-1], y[:-1]
+    a, b, c = vx * vx + vy * vy, x * vx + y * vy, x * x + y * y - distance**2
     root = b * b - a * c
     with np.errstate(divide="ignore", invalid="ignore"):
         entry = np.where(c <= 0, 0.0, (-b - np.sqrt(np.maximum(root, 0.0))) / a)
@@ -199,31 +200,5 @@ def first_meeting(motion: Motion, begin: float, walker: Walker, distance: float)
     return float(moments[hits[0]] + max(float(entry[hits[0]]), 0.0)) if len(hits) else None
 
 
-def _straight(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return times and points in plan view of a motion, accelerated rows cut into chords."""
-    curved = np.flatnonzero(motion.eases[:-1] != 1)
-    if not len(curved):
-        return motion.times, motion.points[:, :2]
-    share = np.arange(1, _CHORDS) / _CHORDS
-    spans, ways = np.diff(motion.times), np.diff(motion.points[:, :2], axis=0)
-    ease = motion.eases[curved, None]
-    driven = share * (ease + (1 - ease) * share)
-    times = (motion.times[curved, None] + share * spans[curved, None]).ravel()
-    points = (motion.points[curved, None, :2] + driven[..., None] * ways[curved, None]).reshape(-1, 2)
-    every, where = np.concatenate([motion.times, times]), np.concatenate([motion.points[:, :2], points])
-    order = np.argsort(every, kind="stable")
-    return every[order], where[order]
-
-
-def _driven(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
-
-
 def _at(moments: NDArray[np.float64], times: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([np.interp(moments, times, points[:, axis]) for axis in (0, 1)])
-
-
-def _near(a: NDArray[np.float64], b: NDArray[np.float64], distance: float) -> bool:
-    """Tell whether the boxes around two lines come as near as a distance."""
-    gap = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
-    return bool((gap <= distance).all())

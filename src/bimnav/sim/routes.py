@@ -153,10 +153,10 @@ def _storeys_along(leg: NDArray[np.float64], frame: GridFrame, before: int, afte
 def cell_near(graph: NavGraph, point: tuple[float, float, float], storey: int) -> Cell | None:
     """Return a free cell whose middle a robot reaches straight from a point: its own, else the nearest around."""
     own = graph.frame.cell_at(point[0], point[1], storey=storey)
+    if graph.free[own]:
+        return own
     around = [Cell(storey, own.row + i, own.col + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     free = [cell for cell in around if cell in graph.frame and graph.free[cell]]
-    if own in free:
-        return own
     environment = graph.environment
     for cell in sorted(free, key=lambda cell: (math.dist(graph.frame.center_of(cell)[:2], point[:2]), cell)):
         if environment is None or environment.is_clear(storey, point, graph.frame.center_of(cell)):
