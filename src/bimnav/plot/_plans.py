@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bimnav import _checks
+from bimnav._wording import counted
 from bimnav.errors import InputError
 from bimnav.footprint import footprints_of
 from bimnav.plot._drawing import (
@@ -220,7 +221,7 @@ def plot_fleet(
         for number, stop in enumerate(tour.stops, 1):
             if stop.cell.storey == storey:
                 draw_mark(ax, stop.end, str(number), color)
-        said = f"{robot.name}: {len(tour.stops)} stops, {tour.length:.1f} m"
+        said = f"{robot.name}: {counted('{n} stop[|s]', len(tour.stops))}, {tour.length:.1f} m"
         key.append(Line2D([], [], color=color, linewidth=1.8, marker="s", label=plain(said)))
     legend = ax.get_legend()
     add_key(ax, [*(legend.legend_handles if legend else ()), *key])

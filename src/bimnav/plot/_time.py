@@ -151,7 +151,8 @@ def _moving_plan(result: SimResult, storey: int) -> tuple[Figure, Any]:
         bodies.append(body)
     (left,) = ax.plot([], [], "o", color="#d55e00", markersize=6, markeredgecolor="white", zorder=9)
     title = ax.set_title(" ", fontsize=10)
-    figure.canvas.draw()
+    for _ in range(2):  # ticks get their places in the first
+        figure.canvas.draw()
     figure.set_layout_engine("none")  # the layout is found once, not for every frame
     served = {event.target: event.time for event in result.log if event.event == "end_service"}
 
