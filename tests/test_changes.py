@@ -198,3 +198,13 @@ def test_a_cost_given_to_a_target_without_floor_outlasts_changes_on_top_of_it():
     dear, crate = np.full(graph.frame.shape, 3.0), shapely.box(*graph.frame.box_of(cell))
     before, after = graph.with_cost(dear).with_obstacle(crate), graph.with_obstacle(crate).with_cost(dear)
     assert before.cost[cell] == after.cost[cell] == 3
+
+
+def test_a_crate_that_bears_the_name_of_a_door_is_not_that_door():
+    graph = rooms()
+    west, east = graph.frame.cell_at(0.5, 0.5), graph.frame.cell_at(6.0, 2.0)
+    crate = graph.with_obstacle(shapely.box(0.3, 3.2, 0.6, 3.5), global_id="door")
+    shut = crate.close_door("door")
+    assert crate.components[west] == crate.components[east]
+    assert shut.components[west] != shut.components[east]
+    assert shut.open_door("door").cost.tobytes() == crate.cost.tobytes()

@@ -43,6 +43,8 @@ __all__ = ["Conflict", "NavGraph", "NodeKind", "Objective", "Stop", "Unreached",
 
 Objective: TypeAlias = Literal["distance", "time", "energy"]
 
+_CLOSED = "closed door"  # the rule by which a closed door is an obstacle
+
 
 class NodeKind(IntEnum):
     """What a cell is for in one task."""
@@ -366,7 +368,7 @@ class NavGraph(Kept):
         ModelError
             If no floor leads through a door of this GlobalId.
         """
-        if self._is_closed(global_id):
+        if any(_is_door(entry, global_id) for entry in self.changes.placed):
             return self
         environment = self.environment
         doorways = [] if environment is None else environment.regions
@@ -378,14 +380,12 @@ class NavGraph(Kept):
                 {"global_id": global_id},
             )
         door = next(door for door in environment.building.doors if door.global_id == global_id)
-        return self._with_placed(ways, global_id, door.name, door.element.ifc_class, "closed door")
+        return self._with_placed(ways, global_id, door.name, door.element.ifc_class, _CLOSED)
 
     def open_door(self, global_id: str) -> Self:
         """Return the graph with a door open that `close_door` had closed."""
-        return self.without_obstacle(global_id) if self._is_closed(global_id) else self
-
-    def _is_closed(self, global_id: str) -> bool:
-        return any(entry.global_id == global_id for entry in self.changes.placed)
+        kept = tuple(entry for entry in self.changes.placed if not _is_door(entry, global_id))
+        return self._changed(placed=kept) if len(kept) < len(self.changes.placed) else self
 
     def _with_placed(
         self, polygons: Iterable[tuple[int, BaseGeometry]], global_id: str, name: str, ifc_class: str, rule: str
@@ -607,6 +607,11 @@ class NavGraph(Kept):
             for cell, kind, center in zip(cells, kinds, centers, strict=True)
         )
         return networkx_of(nodes, self.edges())
+
+
+def _is_door(entry: Placed, global_id: str) -> bool:
+    """Tell whether an entry is a door closed since; obstacles may bear the same GlobalId."""
+    return entry.global_id == global_id and entry.obstacle.rule == _CLOSED
 
 
 def _frozen(array: NDArray[Any]) -> NDArray[Any]:
