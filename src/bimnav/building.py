@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bimnav import _checks
-from bimnav._identity import global_id_of as global_id_of
 from bimnav._shapes import Mesh, Shape, bounds_of
 from bimnav.detections import Detection
 from bimnav.errors import ModelError, ValueRangeError

@@ -10,7 +10,8 @@ from typing import Any
 __all__ = ["examine"]
 
 _PACKAGES = (
-    "bimnav ifcopenshell manifold3d matplotlib numba numpy pydantic python-fcl rustworkx scipy shapely simpy trimesh"
+    "bimnav ifcopenshell joblib lark manifold3d matplotlib numba numpy pydantic python-fcl pyvrp rustworkx scipy "
+    "shapely simpy trimesh"
 )
 
 

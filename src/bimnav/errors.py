@@ -10,7 +10,6 @@ __all__ = [
     "BimnavError",
     "BudgetError",
     "CacheError",
-    "ExportError",
     "FileKindError",
     "FileMissingError",
     "FileTooLargeError",
@@ -294,12 +293,6 @@ class OutputError(BimnavError, OSError):
     """A file cannot be written; what stood there before is unchanged."""
 
     code = "BN-OUT-001"
-
-
-class ExportError(OutputError):
-    """A result cannot be expressed in the format asked for."""
-
-    code = "BN-OUT-002"
 
 
 class CacheError(OutputError):

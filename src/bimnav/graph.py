@@ -21,8 +21,8 @@ from bimnav._approach import stop_for
 from bimnav._changes import Changes, Placed, cells_under, changed_arrays, indexes_of
 from bimnav._cut import FINEST, Conflict, conflict_at, cut, zone_factor
 from bimnav._explicit import Edges, networkx_of, rustworkx_of
+from bimnav._identity import global_id_of
 from bimnav._kept import Kept
-from bimnav.building import global_id_of
 from bimnav.environment import IndoorEnvironment, Obstacle, grown
 from bimnav.errors import GeometryError, GridError, ModelError, ValueRangeError
 from bimnav.grid import Cell, GridFrame

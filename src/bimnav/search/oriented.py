@@ -17,7 +17,6 @@ HEADINGS = 8
 
 _COL = np.array([1, 1, 0, -1, -1, -1, 0, 1])
 _ROW = np.array([0, 1, 1, 1, 0, -1, -1, -1])
-_FAR = np.inf
 
 
 def find_motion(

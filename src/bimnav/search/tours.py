@@ -59,16 +59,6 @@ def _random(state: NDArray[np.uint64], below: int) -> int:
 
 
 @lean
-def _two_opt(order: NDArray[np.int32], place: NDArray[np.int32], first: int, last: int) -> None:
-    """Turn around the stretch between two places, both included, or all the rest if that is shorter."""
-    n = len(order)
-    count = (last - first) % n + 1
-    if 2 * count > n:
-        first, count = last + 1, n - count
-    _flip(order, place, first, count)
-
-
-@lean
 def _move_stretch(
     order: NDArray[np.int32], place: NDArray[np.int32], low: int, count: int, gap: int, turned: bool
 ) -> None:

@@ -12,7 +12,7 @@ import simpy
 
 from bimnav import _checks
 from bimnav.errors import InputError, ValueRangeError
-from bimnav.plan.tours import find_chargers
+from bimnav.plan.charging import find_chargers
 from bimnav.robot import Robot
 from bimnav.sim.agents import RobotAgent
 from bimnav.sim.areas import Passage, SpeedLimit
