@@ -26,7 +26,7 @@ from bimnav.sim.track import RobotStatus
 if TYPE_CHECKING:
     from bimnav.sim.world import World
 
-__all__ = ["Driver"]
+__all__ = ["Driver", "heading_behind"]
 
 _GLANCE = 1.0  # seconds after which a robot that makes way looks again
 _AHEAD = 1.0  # seconds of free way ahead with which it goes on
@@ -100,7 +100,7 @@ class Driver(Body):
         if wanted is None or not (self.world.keeps_history or takes_time):
             return
         pieces = self.recorder.pieces
-        along = _heading(pieces[-1][1].points) if pieces and not takes_time else None
+        along = heading_behind(pieces[-1][1].points) if pieces and not takes_time else None
         facing = self.heading if along is None else along
         if facing is None:  # one that turns slowly and has not moved faces the right way
             facing = wanted if takes_time else 0.0
@@ -248,7 +248,7 @@ class Driver(Body):
         x, y, z = motion.points[-1].tolist()
         self.place, self.storey = (x, y, z), motion.storeys.item(-1)
         if not math.isinf(self.robot.turn_rate):
-            facing = _heading(motion.points)
+            facing = heading_behind(motion.points)
             self.heading = self.heading if facing is None else facing
 
     def brake(self, begin: float, motion: Motion, passed: float, errand: Errand, *, sudden: bool) -> Step:
@@ -309,7 +309,7 @@ class Driver(Body):
         self.run_down()
 
 
-def _heading(points: NDArray[np.float64]) -> float | None:
+def heading_behind(points: NDArray[np.float64]) -> float | None:
     """Return the direction of the last piece of a line in plan view, radians; None if it has none."""
     for dx, dy in np.diff(points[:, :2], axis=0)[::-1].tolist():
         if math.hypot(dx, dy) > JOINED:

@@ -18,6 +18,7 @@ __all__ = ["Chords", "Motion", "drive", "rest", "stand"]
 
 _SAME_POINT = 1e-9  # metres
 _NOW, _EVEN = np.zeros(1), np.ones(1)
+_PAIRWISE = 8  # so many numbers numpy adds one after the other
 _CHORDS = 8  # straight pieces an accelerated row is cut into
 _STRAIGHT = 1e-6  # radians; a smaller change of direction is rounding
 
@@ -290,87 +291,100 @@ def drive(
         Highest speed on every piece of the line; None for no limit.
     """
     speed = robot.speed if speed is None else speed
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if math.isinf(robot.acceleration) and math.isinf(robot.turn_rate) and limits is None:
-        reached = np.append(0.0, steps.cumsum())
+        reached = np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
         n = len(points)
         return Motion(reached / speed, points, storeys, np.ones(n), np.zeros(n), float(reached[-1]))
-    kept = np.append(True, steps > _SAME_POINT)
-    line, on, lengths = points[kept], storeys[kept], steps[kept[1:]]
+    places, floors = points.tolist(), storeys.tolist()
+    tops = [speed] * (len(places) - 1) if limits is None else [min(speed, limit) for limit in limits]
+    line, on, lengths, kept = [places[0]], [floors[0]], [], []
+    for a, b, floor, top in zip(places, places[1:], floors[1:], tops, strict=False):
+        dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        if length > _SAME_POINT:
+            line.append(b)
+            on.append(floor)
+            lengths.append(length)
+            kept.append(top)
     if len(line) == 1:
-        return stand(line[0], int(on[0]))
-    tops = np.full(len(lengths), speed) if limits is None else np.minimum(speed, np.asarray(limits)[kept[1:]])
-    turns = _turns(line, heading) if math.isfinite(robot.turn_rate) else np.zeros(len(lengths))
-    return _driven(line, on, lengths, tops, turns, robot)
+        return stand(line[0], on[0])
+    turns = _turns(line, heading) if math.isfinite(robot.turn_rate) else [0.0] * len(lengths)
+    return _driven(line, on, lengths, kept, turns, robot)
 
 
-def _turns(line: NDArray[np.float64], heading: float | None) -> NDArray[np.float64]:
+def _turns(line: Sequence[Sequence[float]], heading: float | None) -> list[float]:
     """Return how far to turn before every piece of a line, radians; a piece that only rises turns nothing."""
-    turns = np.zeros(len(line) - 1)
+    turns = []
     facing = heading
-    for k, (dx, dy) in enumerate(np.diff(line[:, :2], axis=0).tolist()):
+    for a, b in pairwise(line):
+        dx, dy = b[0] - a[0], b[1] - a[1]
         if math.hypot(dx, dy) <= _SAME_POINT:
+            turns.append(0.0)
             continue
         ahead = math.atan2(dy, dx)
         turn = 0.0 if facing is None else math.remainder(ahead - facing, 2 * math.pi)
-        turns[k] = turn if abs(turn) > _STRAIGHT else 0.0
+        turns.append(turn if abs(turn) > _STRAIGHT else 0.0)
         facing = ahead
     return turns
 
 
 def _driven(
-    line: NDArray[np.float64],
-    on: NDArray[np.int32],
-    lengths: NDArray[np.float64],
-    tops: NDArray[np.float64],
-    turns: NDArray[np.float64],
+    line: Sequence[Sequence[float]],
+    on: Sequence[int],
+    lengths: Sequence[float],
+    tops: Sequence[float],
+    turns: Sequence[float],
     robot: Robot,
 ) -> Motion:
     """Put the pieces of a line together: turns, and the three phases of every piece."""
     speeds = _speeds_at(lengths, tops, turns, robot.acceleration)
-    times, points, storeys, eases, turned = [0.0], [line[0]], [int(on[0])], [1.0], [0.0]
-
-    def go(point: NDArray[np.float64], storey: int, span: float, ease: float, turn: float = 0.0) -> None:
-        eases[-1], turned[-1] = ease, turn
-        times.append(times[-1] + span)
-        points.append(point)
-        storeys.append(storey)
-        eases.append(1.0)
-        turned.append(0.0)
-
+    time, times, points, storeys = 0.0, [0.0], [line[0]], [on[0]]
+    eases, turned = [], []
     for k, (a, b) in enumerate(pairwise(line)):
         if turns[k]:
-            go(a, int(on[k]), abs(float(turns[k])) / robot.turn_rate, 1.0, float(turns[k]))
-        for share, span, ease in _phases(
-            float(lengths[k]), speeds[k], float(tops[k]), speeds[k + 1], robot.acceleration
-        ):
-            last = share >= 1
-            go(b if last else a + share * (b - a), int(on[k + 1]) if last else int(on[k]), span, ease)
+            time += abs(turns[k]) / robot.turn_rate
+            times.append(time)
+            points.append(a)
+            storeys.append(on[k])
+            eases.append(1.0)
+            turned.append(turns[k])
+        for share, span, ease in _phases(lengths[k], speeds[k], tops[k], speeds[k + 1], robot.acceleration):
+            time += span
+            times.append(time)
+            if share >= 1:
+                points.append(b)
+                storeys.append(on[k + 1])
+            else:
+                points.append([x + share * (y - x) for x, y in zip(a, b, strict=True)])
+                storeys.append(on[k])
+            eases.append(ease)
+            turned.append(0.0)
+    total = sum(lengths) if len(lengths) < _PAIRWISE else float(np.array(lengths).sum())
     return Motion(
         np.array(times),
         np.array(points),
         np.array(storeys, dtype=np.int32),
-        np.array(eases),
-        np.array(turned),
-        float(lengths.sum()),
+        np.array([*eases, 1.0]),
+        np.array([*turned, 0.0]),
+        total,
     )
 
 
 def _speeds_at(
-    lengths: NDArray[np.float64], tops: NDArray[np.float64], turns: NDArray[np.float64], acceleration: float
+    lengths: Sequence[float], tops: Sequence[float], turns: Sequence[float], acceleration: float
 ) -> list[float]:
     """Return the speed at every point: what limits, turns, starting and braking allow."""
     n = len(lengths)
-    speeds = [0.0, *np.minimum(tops[:-1], tops[1:]).tolist(), 0.0]
+    speeds = [0.0, *map(min, tops, tops[1:]), 0.0]
     for k in range(1, n):
         if turns[k]:
             speeds[k] = 0.0
     if math.isinf(acceleration):
         return speeds
     for k in range(n):
-        speeds[k + 1] = min(speeds[k + 1], math.sqrt(speeds[k] ** 2 + 2 * acceleration * float(lengths[k])))
+        speeds[k + 1] = min(speeds[k + 1], math.sqrt(speeds[k] ** 2 + 2 * acceleration * lengths[k]))
     for k in reversed(range(n)):
-        speeds[k] = min(speeds[k], math.sqrt(speeds[k + 1] ** 2 + 2 * acceleration * float(lengths[k])))
+        speeds[k] = min(speeds[k], math.sqrt(speeds[k + 1] ** 2 + 2 * acceleration * lengths[k]))
     return speeds
 
 

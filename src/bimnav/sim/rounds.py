@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterator
+from itertools import repeat
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
+from bimnav.sim.driving import heading_behind
 from bimnav.sim.errands import NEXT, Process
 from bimnav.sim.log import new_event
+from bimnav.sim.motion import Motion, stand
 from bimnav.sim.routes import Legs
 from bimnav.sim.track import RobotStatus
 
@@ -20,14 +26,13 @@ __all__ = ["work_through"]
 def work_through(agent: RobotAgent, legs: Legs) -> Process:
     """Do every stop of a tour that nothing can disturb: what `go` and `serve` do, without looking around."""
     world, clock, name = agent.world, agent.world.clock, agent.name
-    write, pass_time, removable = world.write, world.pass_time, world.removable
+    write, pass_time, removable, keeps = world.write, world.pass_time, world.removable, world.keeps_history
     moving, working, idle = RobotStatus.MOVING, RobotStatus.WORKING, RobotStatus.IDLE
-    reached = legs.reached()
-    times, last = reached / agent.robot.speed, legs.edges[1:] - 1
-    lengths, durations, storeys = reached[last].tolist(), times[last].tolist(), legs.storeys[last].tolist()
     begins, arrivals, ends = [], [], []
     (x, y, z), floor = agent.place, world.storeys[agent.storey]
-    for stop, length, duration, storey in zip(agent.stops, lengths, durations, storeys, strict=False):
+    times = _times(agent, legs)
+    ways = _driven(agent, legs) if times is None else _rushed(legs, times)
+    for k, (stop, (length, duration, storey, motion)) in enumerate(zip(agent.stops, ways, strict=False)):
         target, called = stop.global_id, stop.name
         begin = clock.now
         write(new_event((begin, name, "depart", moving, floor, x, y, z, target, called, NEXT, 0.0, None, "")))
@@ -38,6 +43,9 @@ def work_through(agent: RobotAgent, legs: Legs) -> Process:
         write(new_event((now, name, "begin_service", working, *place, "", length, None, "")))
         begins.append(begin)
         arrivals.append(now)
+        if keeps and motion is not None:
+            agent.recorder.add(float(begin), motion, moving, k)
+            agent.recorder.add(float(now), stand((x, y, z), storey), working, k)
         yield pass_time(world.draw_seconds(agent, stop))
         now = clock.now
         write(new_event((now, name, "end_service", idle, *place, "", length, None, "")))
@@ -50,8 +58,34 @@ def work_through(agent: RobotAgent, legs: Legs) -> Process:
     agent.place, agent.storey, agent.leg_distance = (x, y, z), storey, length
     agent.last = agent.since = now
     _settle(agent, begins, arrivals, ends)
-    if world.keeps_history:
+    if keeps and times is not None:
         agent.recorder.add_rounds(legs, times, begins, arrivals)
+
+
+_Way: TypeAlias = tuple[float, float, int, Motion | None]  # metres, seconds, storey at the end, how it is driven
+
+
+def _times(agent: RobotAgent, legs: Legs) -> NDArray[np.float64] | None:
+    """Return when a robot that starts, stops and turns at once is where on its leg; None for another."""
+    robot = agent.robot
+    is_agile = math.isinf(robot.acceleration) and math.isinf(robot.turn_rate)
+    return legs.reached() / robot.speed if is_agile else None
+
+
+def _rushed(legs: Legs, times: NDArray[np.float64]) -> Iterator[_Way]:
+    last = legs.edges[1:] - 1
+    return zip(legs.reached()[last].tolist(), times[last].tolist(), legs.storeys[last].tolist(), repeat(None))
+
+
+def _driven(agent: RobotAgent, legs: Legs) -> Iterator[_Way]:
+    """Yield legs of a robot that accelerates, or turns, each when it is departed for."""
+    turns = math.isfinite(agent.robot.turn_rate)
+    for k in range(len(legs)):
+        line = legs.line(k)
+        motion = agent.world.rehearsal.drive(line, agent.robot, agent.robot.speed, agent.heading)
+        facing = heading_behind(motion.points) if turns else None
+        agent.heading = agent.heading if facing is None else facing
+        yield motion.length, motion.duration, int(line.storeys[-1]), motion
 
 
 def _settle(agent: RobotAgent, begins: list[float], arrivals: list[float], ends: list[float]) -> None:

@@ -144,11 +144,9 @@ class World:
         return self.doors[name].label if name in self.doors else f"charger {name}" if name in self.chargers else name
 
     def is_undisturbed(self, agent: RobotAgent) -> bool:
-        """Tell whether nothing can come between a robot and its tour, and it starts, stops and turns at once."""
-        robot = agent.robot
-        is_agile = math.isinf(robot.acceleration) and math.isinf(robot.turn_rate) and not agent.tires
+        """Tell whether nothing can come between a robot and its tour."""
         is_simple = all(stop.kind == "target" and stop.heading is None for stop in agent.stops)
-        return is_agile and is_simple and self.is_plain and not self.is_eventful and self.setting.speed is None
+        return not agent.tires and is_simple and self.is_plain and not self.is_eventful and self.setting.speed is None
 
     def asset_of(self, stop: Stop) -> str:
         """Return maker, model and the like of a target, if the model tells."""
