@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import time
 import tracemalloc
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -29,20 +30,28 @@ NAMES = (
     "`simulate(history=False)`",
     "`simulate`, a robot that accelerates and turns",
     "the same with `history=False`",
+    "the same, every leg another",
+    "the same among three people, doors that open and a battery",
 )
 
 
 class Rounds:
-    """A tour between two points, many times over, without a planner."""
+    """A tour from one end of a corridor to the other, many times over, without a planner.
 
-    def __init__(self, count: int) -> None:
+    Parameters
+    ----------
+    differ
+        Whether every leg is another: rounds are worked out once.
+    """
+
+    def __init__(self, count: int, *, differ: bool = False) -> None:
         self.graph = NavGraph.from_mask(np.ones((1, 12), dtype=bool))
-        ends = [(10.5, 0.5, 0.0), (0.5, 0.5, 0.0)]
-        ways = [np.array([ends[1], ends[0]]), np.array([ends[0], ends[1]])]
         cells = [Cell(0, 0, 10), Cell(0, 0, 0)]
-        self.stops = [Stop(f"s{k}", f"s{k}", cells[k % 2], ends[k % 2], ends[k % 2]) for k in range(count)]
-        self.route = [ways[k % 2] for k in range(count)]
-        self.start, self.start_point, self.unreached, self.return_to_start = cells[1], ends[1], (), False
+        shift = 0.4 / count if differ else 0.0
+        ends = [(0.5, 0.5, 0.0), *((10.5 - 10 * (k % 2) + k * shift, 0.5, 0.0) for k in range(count))]
+        self.stops = [Stop(f"s{k}", f"s{k}", cells[k % 2], end, end) for k, end in enumerate(ends[1:])]
+        self.route = [np.array(pair) for pair in pairwise(ends)]
+        self.start, self.start_point, self.unreached, self.return_to_start = cells[1], ends[0], (), False
 
 
 def bare(events: int) -> float:
@@ -59,9 +68,9 @@ def bare(events: int) -> float:
     return events / (time.process_time() - begin)
 
 
-def ours(stops: int, **more) -> tuple[float, int]:
+def ours(stops: int, *, differ: bool = False, **more) -> tuple[float, int]:
     """Return the events of a simulation in a second of processor time, and their number."""
-    tour, seen = Rounds(stops), [0]
+    tour, seen = Rounds(stops, differ=differ), [0]
 
     def count(_):
         seen[0] += 1
@@ -155,7 +164,24 @@ def main() -> None:
     count = 2_000 if given.quick else 5_000
     floor = max(bare(5 * count) for _ in range(3))
     careful = bn.Robot("R1", acceleration=0.5, turn_rate=1.0)
-    kinds = ({}, {"history": False}, {"robot": careful}, {"robot": careful, "history": False})
+    quiet = {"robot": careful, "history": False}
+    tired = bn.Robot("R1", acceleration=0.5, turn_rate=1.0, radius=0.2, battery_wh=1e6, drive_power=60, work_power=40)
+    busy = {
+        "robot": tired,
+        "people": [
+            bn.Person(f"guest {k}", route=((3.0 * k, -4.0), (3.0 * k, 5.0)), speed=0.6 + 0.2 * k, back_and_forth=True)
+            for k in (1, 2, 3)
+        ],
+        "doors": [bn.SimDoor("door", "automatic", 3.0, polygon=shapely.box(5.0, 0.0, 5.5, 1.0))],
+    }
+    kinds = (
+        {},
+        {"history": False},
+        {"robot": careful},
+        quiet,
+        quiet | {"differ": True},
+        quiet | busy | {"differ": True},
+    )
     rates = [max(ours(count, **more)[0] for _ in range(3)) for more in kinds]
     lines = [
         "| | events in a second of processor time | of bare simpy |",

@@ -10,10 +10,12 @@ import pytest
 import shapely
 from hypothesis import given, settings, strategies as st
 
+from bimnav.graph import NavGraph
 from bimnav.robot import Robot
 from bimnav.sim import SpeedLimit
 from bimnav.sim.areas import crossings, cut_at
 from bimnav.sim.motion import Motion, drive
+from bimnav.sim.people import Person, Walker, first_meeting
 from bimnav.sim.routes import Line
 from bimnav.sim.stretches import cut
 from bimnav.sim.track import RobotStatus, TrackRecorder
@@ -187,3 +189,26 @@ def test_a_line_through_a_square_is_inside_it_from_edge_to_edge():
     assert (found.begin, found.end) == pytest.approx((8, 14))
     assert crossings(points, storeys, [(shapely.box(8, -1, 12, 4), 1)]) == []
     assert crossings(points, storeys, [(shapely.box(0, 0, 10, -5), 0)])[0].end == pytest.approx(10)
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=60, deadline=None)
+def test_a_robot_and_a_person_meet_when_they_first_come_near_and_not_before(seed):
+    rng = np.random.default_rng(seed)
+    points, storeys = line(*rng.uniform(0, 10, (int(rng.integers(2, 6)), 2)))
+    robot = Robot("R", speed=float(rng.uniform(0.5, 2)), acceleration=float(rng.choice([0.5, math.inf])), turn_rate=1.0)
+    motion = drive(points, storeys, robot)
+    route = tuple(map(tuple, rng.uniform(0, 10, (3, 2)).tolist()))
+    person = Person("p", route, speed=float(rng.uniform(0.3, 2)), start=float(rng.uniform(-5, 5)), back_and_forth=True)
+    walker = Walker(person, NavGraph.from_mask(np.ones((1, 1), dtype=bool)), rng, 0.0)
+    meeting, near = first_meeting(motion, 0.0, walker, 0.8), 0.8
+    moments = np.arange(max(person.start, 0.0), motion.duration, 0.01)
+    gaps = np.array([math.dist(walker.point_at(t) or (99, 99), motion.point_at(t)[:2]) for t in moments.tolist()])
+    if meeting is None:
+        closing = (gaps[1:] < near - 0.05) & (np.diff(gaps) < -1e-4) & (gaps[:-1] >= near)
+        assert not closing.any()
+    else:
+        at = math.dist(walker.point_at(meeting) or (99, 99), motion.point_at(meeting)[:2])
+        assert at <= near + 0.05
+        entering = (gaps[1:] < near - 0.05) & (gaps[:-1] >= near) & (moments[1:] < meeting - 0.02)
+        assert not entering.any()

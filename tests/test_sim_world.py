@@ -17,6 +17,7 @@ from bimnav.robot import Robot
 from bimnav.sim import (
     Chance,
     Charger,
+    DoorLocks,
     Lift,
     Passage,
     Person,
@@ -667,3 +668,13 @@ def test_a_line_that_meets_an_area_only_by_a_rounding_does_not_cross_it():
 
     a, b = np.array([0.0, 0.0]), np.array([1.0, 0.0])
     assert _inside(a, b, shapely.LineString()) == []
+
+
+def test_a_door_that_comes_to_need_opening_is_waited_for_although_the_way_is_known():
+    there, back = [(0, 0, 0), (10, 0, 0)], [(10, 0, 0), (0, 0, 0)]
+    locks = DoorLocks(17.0, "door")
+    robot = Robot("R1", speed=1.0, keys=("door",))
+    door = SimDoor("door", "open", 3.0, polygon=shapely.box(4, -1, 5, 1))
+    result = simulate(tour_along(there, back, there, back), robot=robot, doors=[door], events=[locks])
+    assert at(result, "open_door") == pytest.approx([24.0, 38.0], abs=1e-5)
+    assert len(result.served) == 4

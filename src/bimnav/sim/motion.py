@@ -29,7 +29,7 @@ class Chords(NamedTuple):
     Parameters
     ----------
     times : (n,) float64, seconds since it began
-    points : (n, 2) float64, metres
+    points : (2, n) float64, metres
     reached : (n,) float64, metres driven
     low, high : (2,) float64, metres
         The box around it.
@@ -139,7 +139,7 @@ class Motion:
         times, points = _straight(self)
         steps = points[1:] - points[:-1]
         reached = np.append(0.0, np.linalg.norm(steps, axis=1).cumsum())
-        return Chords(times, points, reached, points.min(axis=0), points.max(axis=0))
+        return Chords(times, np.ascontiguousarray(points.T), reached, points.min(axis=0), points.max(axis=0))
 
     def _inside(self, seconds: float) -> tuple[int, NDArray[np.float64], float]:
         """Return row, point and speed at a time."""

@@ -15,6 +15,7 @@ from bimnav import _checks
 from bimnav.errors import InputError, ValueRangeError
 from bimnav.grid import Cell
 from bimnav.plan import find_path
+from bimnav.sim._meeting import meeting
 from bimnav.sim.motion import Motion
 
 if TYPE_CHECKING:
@@ -179,25 +180,11 @@ def first_meeting(motion: Motion, begin: float, walker: Walker, distance: float)
     own = motion.chords
     times, points = walker.between(begin, begin + motion.duration)
     times = times - begin
-    low, high = max(float(times[0]), 0.0), min(float(times[-1]), motion.duration)
     apart = np.maximum(own.low - points.max(axis=0), points.min(axis=0) - own.high)
-    if low >= high or (apart > distance).any():
+    if (apart > distance).any():
         return None
-    moments = np.sort(np.concatenate([[low, high], own.times, times]))
-    kept = (moments >= low) & (moments <= high)
-    kept[1:] &= moments[1:] != moments[:-1]
-    moments = moments[kept]
-    span = moments[1:] - moments[:-1]
-    x, y = (np.interp(moments, own.times, own.points[:, k]) - np.interp(moments, times, points[:, k]) for k in (0, 1))
-    reached = np.interp(moments, own.times, own.reached)
-    moving = reached[1:] - reached[:-1] > 0
-    vx, vy, x, y = (x[1:] - x[:-1]) / span, (y[1:] - y[:-1]) / span, x[:-1], y[:-1]
-    a, b, c = vx * vx + vy * vy, x * vx + y * vy, x * x + y * y - distance**2
-    root = b * b - a * c
-    with np.errstate(divide="ignore", invalid="ignore"):
-        entry = np.where(c <= 0, 0.0, (-b - np.sqrt(np.maximum(root, 0.0))) / a)
-    hits = np.flatnonzero(moving & (b < 0) & (root > 0) & (entry <= span))
-    return float(moments[hits[0]] + max(float(entry[hits[0]]), 0.0)) if len(hits) else None
+    found = meeting(own.times, own.points, own.reached, times, np.ascontiguousarray(points.T), distance**2)
+    return None if math.isnan(found) else found
 
 
 def _at(moments: NDArray[np.float64], times: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
