@@ -75,6 +75,6 @@ def meeting(
         if farther - driven > 0 and b < 0 and root > 0:
             entry = 0.0 if c <= 0 else (-b - math.sqrt(root)) / a
             if entry <= span:
-                return before + max(entry, 0.0)
+                return float(before + max(entry, 0.0))
         before, x, y, driven = after, next_x, next_y, farther
     return math.nan
