@@ -174,6 +174,16 @@ def test_objectives_choose_between_a_long_ramp_and_a_slow_lift():
     assert found == {"distance": ("lift", 3.0), "time": ("ramp", 40.0), "energy": ("lift", 60.0)}
 
 
+def test_a_robot_drives_to_the_cabin_and_waits_in_it():
+    robot = bn.Robot(speed=0.5, drive_power=100.0, idle_power=1.0)
+    graph = bn.build_graph(bn.make_environment(two_storeys(), TASK, robot), cell_size=0.5, objective="energy")
+    a, b = graph.frame.cell_at(1, 3, storey=0), graph.frame.cell_at(1, 3, storey=1)
+    rise = graph.frame.elevations[1] - graph.frame.elevations[0]
+    lift = Link(a, b, rise + 4.0, 60.0, "lift", "lift")
+    assert graph.cost_of(lift) == pytest.approx(8 * 100 + 52 * 1)
+    assert graph.cost_of(replace(lift, seconds=5.0)) == pytest.approx(5 * 100)
+
+
 def test_without_power_there_is_no_energy_to_save():
     with pytest.raises(ValueRangeError, match="drive_power"):
         graph_of(two_storeys(), objective="energy")

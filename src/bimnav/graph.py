@@ -240,8 +240,9 @@ class NavGraph(Kept):
             return link.length * link.factor
         if self.objective == "time":
             return seconds * link.factor
-        power = self._robot.idle_power if link.kind == "lift" else self._robot.drive_power
-        return seconds * power * link.factor
+        waits = 0.0 if link.kind != "lift" else max(seconds - self.seconds_beside(link), 0.0)
+        joules = (seconds - waits) * self._robot.drive_power + waits * self._robot.idle_power
+        return joules * link.factor
 
     def seconds_over(self, link: Link, robot: Robot | None = None) -> float:
         """Return how long a link takes: a ride its own time, what is driven as much longer as a robot is slower.

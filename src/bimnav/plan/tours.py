@@ -124,8 +124,8 @@ class Tour(Kept):
 
     @property
     def gap(self) -> float:
-        """How much the tour costs beyond the lower bound, as a fraction of it, whatever the objective."""
-        return gap_of(self.cost, self.lower_bound)
+        """How much the tour costs beyond the lower bound, as a fraction of it, whatever the objective; 0 if proved."""
+        return 0.0 if self.is_optimal else gap_of(self.cost, self.lower_bound)
 
     @property
     def end_point(self) -> Point:
