@@ -186,8 +186,8 @@ def main() -> None:
     lines = [
         "| | events in a second of processor time | of bare simpy |",
         "| --- | --- | --- |",
-        f"| simpy, one process that waits | {floor:,.0f} | 1.00 |",
-        *(f"| {name} | {rate:,.0f} | {rate / floor:.2f} |" for name, rate in zip(NAMES, rates, strict=True)),
+        f"| simpy, one process that waits | {floor:,.0f} | 1.000 |",
+        *(f"| {name} | {rate:,.0f} | {rate / floor:.3f} |" for name, rate in zip(NAMES, rates, strict=True)),
         "",
     ]
     tracemalloc.start()

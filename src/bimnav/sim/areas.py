@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -179,30 +181,26 @@ def cut_at(
     pieces
         Points and storeys, in order; each begins where the one before ended.
     """
-    reached = np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
-    total = float(reached[-1])
+    rows, floors = points.tolist(), storeys.tolist()
+    reached = [0.0]
+    for (x, y, z), (u, v, w) in pairwise(rows):
+        dx, dy, dz = u - x, v - y, w - z
+        reached.append(reached[-1] + math.sqrt(dx * dx + dy * dy + dz * dz))
+    total = reached[-1]
     inner = sorted({place for place in places if _JOIN < place < total - _JOIN})
     pieces = []
     for begin, end in zip([0.0, *inner], [*inner, total], strict=True):
-        first = int(np.searchsorted(reached, begin, side="right"))
-        last = int(np.searchsorted(reached, end, side="left"))
-        middle = slice(first, last)
-        ends = [_point_at(points, reached, begin), _point_at(points, reached, end)]
-        on = [storeys[max(first - 1, 0)], storeys[last] if end == total or last == first else storeys[last - 1]]
-        pieces.append(
-            (
-                np.vstack([ends[0], points[middle], ends[1]]),
-                np.concatenate([on[:1], storeys[middle], on[1:]]).astype(np.int32),
-            )
-        )
+        first, last = bisect_right(reached, begin), bisect_left(reached, end)
+        line = [_point_at(rows, reached, begin), *rows[first:last], _point_at(rows, reached, end)]
+        behind = floors[last] if end == total or last == first else floors[last - 1]
+        on = [floors[max(first - 1, 0)], *floors[first:last], behind]
+        pieces.append((np.array(line), np.array(on, dtype=np.int32)))
     return pieces
 
 
-def _point_at(points: NDArray[np.float64], reached: NDArray[np.float64], place: float) -> NDArray[np.float64]:
-    ends: NDArray[np.float64] = points[0] if place <= 0 else points[-1]
+def _point_at(rows: Sequence[Sequence[float]], reached: Sequence[float], place: float) -> Sequence[float]:
     if not 0 < place < reached[-1]:
-        return ends
-    k = int(np.searchsorted(reached, place, side="right")) - 1
+        return rows[0] if place <= 0 else rows[-1]
+    k = bisect_right(reached, place) - 1
     share = (place - reached[k]) / (reached[k + 1] - reached[k])
-    point: NDArray[np.float64] = points[k] + share * (points[k + 1] - points[k])
-    return point
+    return [a + share * (b - a) for a, b in zip(rows[k], rows[k + 1], strict=True)]
