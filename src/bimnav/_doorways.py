@@ -120,7 +120,7 @@ def _plan_of(product: Element | Opening) -> Plan | None:
     if not len(points):
         return None
     origin = points.mean(axis=0)
-    rectangle = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shapely.MultiPoint(points - origin)))
+    rectangle = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shapely.multipoints(points - origin)))
     if len(rectangle) == 2:  # a line
         aside = (rectangle[1] - rectangle[0])[::-1] * (-1, 1)
         rectangle = np.array(
