@@ -62,7 +62,10 @@ def voxelized(path: Path, wanted: Collection[str], bands: Sequence[Band], frame:
     half = frame.cell_size / 2
     for mesh in _meshes(path, wanted):
         mesh.apply_translation((-half, -half, -half))  # trimesh puts the middles of cubes on multiples of their size
-        points = mesh.voxelized(frame.cell_size, max_iter=None).fill().points + half
+        try:
+            points = mesh.voxelized(frame.cell_size).fill().points + half
+        except ValueError:  # a face that trimesh does not get small enough: the product counts as missed
+            continue
         cells = np.floor(points / frame.cell_size).astype(np.int64) - (frame.first_col, frame.first_row, 0)
         for layer, (low, high) in zip(occupied, bands, strict=True):
             column, row, _ = cells[(points[:, 2] > low) & (points[:, 2] < high)].T
