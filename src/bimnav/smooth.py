@@ -33,6 +33,7 @@ __all__ = ["Straight", "closed_cells", "shorten_points", "straighten", "turns_of
 Point = tuple[float, float, float]
 
 _MARGIN = 2e-6  # metres kept from exact shapes: cells are eroded by half of it, and rounding takes far less
+_TWIN = 1e-7  # metres; corners nearer than this are one: far less than the margin
 _QUARTER = 8  # segments of a quarter circle around corners: a body of 0.25 m loses a millimetre
 _SAME = 1e-9  # metres
 _APART = 3.0  # cells; between turns that may move
@@ -220,7 +221,8 @@ class _Plane:
     @cached_property
     def _triangles(self) -> NDArray[np.object_]:
         try:
-            triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(self._free_floor()))
+            floor = shapely.simplify(self._free_floor(), _TWIN)  # else corners that all but coincide make slivers
+            triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(floor))
         except shapely.errors.GEOSException:
             return np.empty(0, dtype=object)
         found: NDArray[np.object_] = triangles[shapely.area(triangles) > 0]
