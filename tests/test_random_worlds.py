@@ -17,6 +17,7 @@ from bimnav import Cell, find_path
 from bimnav.testing import prism, room
 
 PARTS, ROOMS, SAMPLE = 20, 5_000, 12  # parts of the campaign, rooms in each, and how many of them every run takes
+FAILED_ONCE = {2: (1249,)}  # corners that all but coincide: the shorter way round was not seen
 
 
 def things(rng, cell):
@@ -50,7 +51,8 @@ def things(rng, cell):
 @pytest.mark.parametrize("part", range(PARTS))
 def test_no_path_through_a_random_room_touches_anything(part, full):
     searched = 0
-    for number in range(ROOMS if full else SAMPLE):
+    numbers = range(ROOMS) if full else (*range(SAMPLE), *FAILED_ONCE.get(part, ()))
+    for number in numbers:
         rng = np.random.default_rng([part, number])
         cell = float(rng.choice([0.1, 0.15, 0.2, 0.3048]))
         robot = bn.Robot(radius=float(rng.choice([0.0, 0.05, 0.2])), height=1.0)
@@ -74,4 +76,4 @@ def test_no_path_through_a_random_room_touches_anything(part, full):
             check = bn.check_path(points, environment)
             assert check.ok, (part, number, check.violations)
         searched += 1
-    assert searched > 0.9 * (ROOMS if full else SAMPLE)
+    assert searched > 0.9 * len(numbers)
