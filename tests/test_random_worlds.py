@@ -17,7 +17,8 @@ from bimnav import Cell, find_path
 from bimnav.testing import prism, room
 
 PARTS, ROOMS, SAMPLE = 20, 5_000, 12  # parts of the campaign, rooms in each, and how many of them every run takes
-FAILED_ONCE = {2: (1249,)}  # corners that all but coincide: the shorter way round was not seen
+# corners that all but coincide hid the shorter way round; a turn moved onto the side of an obstacle
+FAILED_ONCE = {2: (1249,), 11: (3919,)}
 
 
 def things(rng, cell):

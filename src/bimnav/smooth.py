@@ -33,7 +33,7 @@ __all__ = ["Straight", "closed_cells", "shorten_points", "straighten", "turns_of
 Point = tuple[float, float, float]
 
 _MARGIN = 2e-6  # metres kept from exact shapes: cells are eroded by half of it, and rounding takes far less
-_TWIN = 1e-7  # metres; corners nearer than this are one: far less than the margin
+_TWIN = 1e-7  # metres; what is nearer than this is one: far less than the margin
 _QUARTER = 8  # segments of a quarter circle around corners: a body of 0.25 m loses a millimetre
 _SAME = 1e-9  # metres
 _APART = 3.0  # cells; between turns that may move
@@ -305,4 +305,5 @@ class _Plane:
         """Tell whether the robot can drive from point to point, by the exact shapes."""
         floor, bodies = self._judge
         lines = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
-        return bool(shapely.covers(floor, lines).all()) and not bodies.query(lines, predicate="intersects").size
+        met = bodies.query(lines, predicate="dwithin", distance=_TWIN)  # a point that only just passes has touched
+        return bool(shapely.covers(floor, lines).all()) and not met.size
