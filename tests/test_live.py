@@ -55,7 +55,7 @@ def test_a_door_that_closes_is_repaired_and_its_room_cannot_be_reached():
     assert math.isinf(field.at(east))
     field.update(graph)
     assert_array_equal(field.distance, far)
-    assert "LiveField(from 1 cells of NavGraph" in repr(field)
+    assert repr(field).startswith("LiveField(NavGraph(")
 
 
 @pytest.mark.parametrize("kind", ["stair", "lift"])

@@ -58,7 +58,7 @@ class LiveField:
         self._search(graph)
 
     def __repr__(self) -> str:
-        return f"LiveField(from {len(self._cells)} cells of {self.graph!r})"
+        return f"LiveField({self.graph!r}, {self._cells!r:.60})"
 
     def update(self, graph: NavGraph) -> bool:
         """Take over a changed world; return whether what was known could be repaired or kept.

@@ -25,7 +25,7 @@ MOST_BUCKETS = 4096
 
 _HALF_ROOT = 0.5 * np.sqrt(2.0)
 _SHIFT = 8
-_BLOCK = 1 << _SHIFT
+_BLOCK = 1 << _SHIFT  # cells
 
 
 def flood(
@@ -109,8 +109,8 @@ def flow(
     ----------
     first, after : (a power of two,) int32, scratch
         The first block of every bucket, and the place after its last cell; 0 for an empty one.
-    cells, following : (blocks * 64,) and (blocks,) int32, scratch
-        What the blocks hold, and which block follows; block 0 is none.
+    cells, following : (blocks * 256,) and (blocks,) int32, scratch
+        What the blocks hold, 256 cells each, and which block follows; block 0 is none.
 
     Returns
     -------
